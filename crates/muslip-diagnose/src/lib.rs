@@ -1,0 +1,2 @@
+//! Locates and names what a simulation left out of a recording.
+#![forbid(unsafe_code)]

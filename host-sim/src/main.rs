@@ -1,0 +1,2 @@
+//! The `muslip` command.
+fn main() {}

@@ -1,0 +1,1 @@
+//! Tolerances, seeded noise and reference scenarios shared by the tests.

@@ -1,0 +1,2 @@
+//! Multi-step project commands.
+fn main() {}
