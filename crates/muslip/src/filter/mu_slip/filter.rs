@@ -1,0 +1,118 @@
+use super::config::Config;
+use super::error::{Input, UpdateError};
+use super::state::{Covariance, Estimate, State};
+use super::update::{Choices, Decision, Fusion, Inputs};
+use crate::filter::{Estimator, FrictionMeasurement, PeakEstimate};
+use crate::real::Real;
+
+/// The filter: a validated configuration and the present estimate.
+///
+/// Made by [`Config::build`]. The estimate is plain data, apart from the configuration: copy it with
+/// [`Estimator::estimate`], put it back with [`Estimator::restore`].
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct MuSlipFilter<T> {
+    config: Config<T>,
+    estimate: Estimate<T>,
+}
+
+impl<T: Real> MuSlipFilter<T> {
+    pub(super) fn new(config: Config<T>, estimate: Estimate<T>) -> Self {
+        Self { config, estimate }
+    }
+
+    /// The configuration it was built from.
+    pub fn config(&self) -> &Config<T> {
+        &self.config
+    }
+
+    /// The present state.
+    pub fn state(&self) -> State<T> {
+        self.estimate.state
+    }
+
+    /// The present covariance.
+    pub fn covariance(&self) -> Covariance<T> {
+        self.estimate.covariance
+    }
+
+    /// Back to the initial state and covariance.
+    pub fn reset(&mut self) {
+        self.estimate = Estimate {
+            state: self.config.initial_state,
+            covariance: self.config.initial_covariance,
+        };
+    }
+
+    fn choices(&self) -> Choices {
+        Choices {
+            pseudonoise: self.config.pseudonoise,
+            covariance_form: self.config.covariance_form,
+        }
+    }
+}
+
+impl<T: Real> Estimator<T> for MuSlipFilter<T> {
+    type Measurement = FrictionMeasurement<T>;
+    type Fusion = Fusion<T>;
+    type Estimate = Estimate<T>;
+    type Error = UpdateError;
+
+    /// Corrects the estimate with one measured friction, or rejects it at the gate.
+    ///
+    /// # Errors
+    /// [`UpdateError`]; the estimate is exactly as it was before the call.
+    fn update(&mut self, measurement: &FrictionMeasurement<T>) -> Result<Fusion<T>, UpdateError> {
+        // The square below would hide the sign.
+        if measurement.friction_std <= T::ZERO {
+            return Err(UpdateError::NonPositiveNoise);
+        }
+        let inflated_std = self.config.noise_inflation * measurement.friction_std;
+        let inputs = Inputs {
+            state: self.estimate.state,
+            covariance: self.estimate.covariance,
+            slip_ratio: measurement.slip_ratio,
+            friction: measurement.friction,
+            measurement_variance: inflated_std * inflated_std,
+        };
+        let step = inputs.judged(inputs.step(self.choices()))?;
+        let mut fusion = step.fusion;
+        if self.config.nis_gate.is_some_and(|gate| fusion.nis > gate) {
+            fusion.decision = Decision::Rejected;
+            fusion.signal_after = fusion.signal_before;
+        } else {
+            self.estimate = Estimate {
+                state: step.state,
+                covariance: step.covariance,
+            };
+        }
+        Ok(fusion)
+    }
+
+    fn estimate(&self) -> Estimate<T> {
+        self.estimate
+    }
+
+    fn restore(&mut self, estimate: Estimate<T>) -> Result<(), UpdateError> {
+        if !estimate.state.is_finite() {
+            return Err(UpdateError::NonFinite(Input::State));
+        }
+        if !estimate.covariance.is_positive_definite() {
+            return Err(UpdateError::PriorNotPositiveDefinite);
+        }
+        self.estimate = estimate;
+        Ok(())
+    }
+
+    fn peak(&self) -> PeakEstimate<T> {
+        let Estimate { state, covariance } = self.estimate;
+        let (peak_friction_std, critical_slip_std) = covariance.std();
+        PeakEstimate {
+            peak_friction: state.peak_friction,
+            peak_friction_std,
+            critical_slip: state.critical_slip,
+            critical_slip_std,
+            correlation: covariance.correlation(),
+        }
+    }
+}

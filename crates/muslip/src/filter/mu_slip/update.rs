@@ -1,0 +1,279 @@
+//! The arithmetic of one update, once, and the two free functions that use it.
+
+use super::config::CovarianceForm;
+use super::error::{Input, UpdateError};
+use super::state::{Covariance, Estimate, State};
+use crate::law::rudd;
+use crate::real::Real;
+
+/// Whether a measurement changed the estimate.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub enum Decision {
+    /// It did.
+    Accepted,
+    /// It failed the gate on the normalised innovation; the estimate is what it was.
+    Rejected,
+}
+
+/// What one measurement did. All dimensionless.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Fusion<T> {
+    /// Slip s of the measurement.
+    pub slip_ratio: T,
+    /// Measured friction z.
+    pub measured_friction: T,
+    /// Predicted friction mu(s; x) at the prior state.
+    pub predicted_friction: T,
+    /// Innovation: measured minus predicted.
+    pub innovation: T,
+    /// R: the inflated measurement variance plus the pseudonoise.
+    pub noise_variance: T,
+    /// The pseudonoise alone; zero where it is switched off.
+    pub pseudonoise_variance: T,
+    /// H P Hᵀ with the covariance before the update.
+    pub signal_before: T,
+    /// H P Hᵀ with the covariance after the update and the same H; as before where rejected.
+    pub signal_after: T,
+    /// H P Hᵀ + R, the variance of the innovation.
+    pub innovation_variance: T,
+    /// K of peak friction.
+    pub peak_friction_gain: T,
+    /// K of critical slip.
+    pub critical_slip_gain: T,
+    /// Normalised innovation squared, innovation² / (H P Hᵀ + R).
+    pub nis: T,
+    /// Whether the measurement changed the estimate.
+    pub decision: Decision,
+}
+
+/// The choices of configuration that change the arithmetic. Constants where they are known: the
+/// compiler then drops what is not asked for.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Choices {
+    pub pseudonoise: bool,
+    pub covariance_form: CovarianceForm,
+}
+
+/// The article's.
+const ARTICLE: Choices = Choices {
+    pseudonoise: true,
+    covariance_form: CovarianceForm::Short,
+};
+
+/// One update, computed but not yet judged.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Step<T> {
+    pub state: State<T>,
+    pub covariance: Covariance<T>,
+    pub fusion: Fusion<T>,
+}
+
+/// One measurement as the arithmetic takes it.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Inputs<T> {
+    pub state: State<T>,
+    pub covariance: Covariance<T>,
+    pub slip_ratio: T,
+    pub friction: T,
+    /// (n σ)²
+    pub measurement_variance: T,
+}
+
+impl<T: Real> Inputs<T> {
+    /// The equations of the module, unrolled. Two divisions, no calls.
+    #[inline(always)]
+    pub(super) fn step(&self, choices: Choices) -> Step<T> {
+        let State {
+            peak_friction,
+            critical_slip,
+        } = self.state;
+        let Covariance { p00, p01, p11 } = self.covariance;
+        let law = rudd::expand(peak_friction, critical_slip, self.slip_ratio);
+        let (h0, h1) = (law.by_peak_friction, law.by_critical_slip);
+
+        let pseudonoise = if choices.pseudonoise {
+            let second = T::HALF * law.by_critical_slip_twice;
+            p11 * (law.by_both * law.by_both * p00 + second * second * p11)
+        } else {
+            T::ZERO
+        };
+        let noise = self.measurement_variance + pseudonoise;
+
+        // g = P Hᵀ
+        let g0 = p00 * h0 + p01 * h1;
+        let g1 = p01 * h0 + p11 * h1;
+        let signal = h0 * g0 + h1 * g1;
+        let innovation_variance = signal + noise;
+        let inverse = T::ONE / innovation_variance;
+        let (k0, k1) = (g0 * inverse, g1 * inverse);
+
+        let innovation = self.friction - law.friction;
+        let state = State {
+            peak_friction: peak_friction + k0 * innovation,
+            critical_slip: critical_slip + k1 * innovation,
+        };
+        let covariance = match choices.covariance_form {
+            // K H P = K gᵀ, which is symmetric. Both products on the diagonal are squares times a
+            // positive number, so rounding cannot raise a variance.
+            CovarianceForm::Short => Covariance {
+                p00: p00 - k0 * g0,
+                p01: p01 - k0 * g1,
+                p11: p11 - k1 * g1,
+            },
+            CovarianceForm::Joseph => {
+                // A = I - K H, M = A P, then M Aᵀ + K R Kᵀ
+                let (a00, a01) = (T::ONE - k0 * h0, -(k0 * h1));
+                let (a10, a11) = (-(k1 * h0), T::ONE - k1 * h1);
+                let (m00, m01) = (a00 * p00 + a01 * p01, a00 * p01 + a01 * p11);
+                let (m10, m11) = (a10 * p00 + a11 * p01, a10 * p01 + a11 * p11);
+                Covariance {
+                    p00: m00 * a00 + m01 * a01 + k0 * k0 * noise,
+                    p01: m00 * a10 + m01 * a11 + k0 * k1 * noise,
+                    p11: m10 * a10 + m11 * a11 + k1 * k1 * noise,
+                }
+            }
+        };
+        let fusion = Fusion {
+            slip_ratio: self.slip_ratio,
+            measured_friction: self.friction,
+            predicted_friction: law.friction,
+            innovation,
+            noise_variance: noise,
+            pseudonoise_variance: pseudonoise,
+            signal_before: signal,
+            // H (I - K H) P Hᵀ = signal (1 - signal/(signal + R)), without the cancellation
+            signal_after: signal * noise * inverse,
+            innovation_variance,
+            peak_friction_gain: k0,
+            critical_slip_gain: k1,
+            nis: innovation * innovation * inverse,
+            decision: Decision::Accepted,
+        };
+        Step {
+            state,
+            covariance,
+            fusion,
+        }
+    }
+
+    /// The step if state and covariance may be kept.
+    ///
+    /// Results are judged rather than inputs: an input that is not finite makes a result that is not
+    /// finite, except a noise that is infinite, which shows in the innovation's variance. Only a
+    /// refusal takes the time to find out why.
+    #[inline(always)]
+    pub(super) fn judged(&self, step: Step<T>) -> Result<Step<T>, UpdateError> {
+        let variance = step.fusion.innovation_variance;
+        let sound = self.measurement_variance > T::ZERO
+            && variance > T::ZERO
+            && variance.is_finite()
+            && step.state.is_finite()
+            && step.covariance.is_positive_definite();
+        if sound { Ok(step) } else { Err(self.reason()) }
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn reason(&self) -> UpdateError {
+        let p = self.covariance;
+        if !self.state.is_finite() {
+            UpdateError::NonFinite(Input::State)
+        } else if !(p.p00.is_finite() && p.p01.is_finite() && p.p11.is_finite()) {
+            UpdateError::NonFinite(Input::Covariance)
+        } else if !self.slip_ratio.is_finite() {
+            UpdateError::NonFinite(Input::SlipRatio)
+        } else if !self.friction.is_finite() {
+            UpdateError::NonFinite(Input::Friction)
+        } else if !self.measurement_variance.is_finite() {
+            UpdateError::NonFinite(Input::Noise)
+        } else if self.measurement_variance <= T::ZERO {
+            UpdateError::NonPositiveNoise
+        } else if !p.is_positive_definite() {
+            UpdateError::PriorNotPositiveDefinite
+        } else {
+            let step = self.step(ARTICLE);
+            if step.state.is_finite() && step.fusion.innovation_variance.is_finite() {
+                UpdateError::PosteriorNotPositiveDefinite
+            } else {
+                UpdateError::Overflow
+            }
+        }
+    }
+}
+
+/// Corrects state and covariance with one measured friction: the article's filter, lean.
+///
+/// | argument | symbol | unit | valid range |
+/// |---|---|---|---|
+/// | `state` | x = (mup, sp) | - | finite |
+/// | `covariance` | P, 2×2 | - | positive definite |
+/// | `slip_ratio` | s | - | finite; 0..=1 is meant |
+/// | `friction` | z | - | finite |
+/// | `measurement_variance` | (n σ)² | - | > 0; inflation included, pseudonoise not |
+///
+/// Equations: see the [module](crate::filter::mu_slip). Covariance: short form. Innovation is measured minus
+/// predicted. Cost: two divisions, no loops, no calls.
+///
+/// # Errors
+/// [`UpdateError`]; nothing is changed, as state and covariance are the caller's.
+///
+/// ```
+/// use muslip::filter::mu_slip::{Range, update};
+///
+/// let (mut x, mut p) = (Range::Aircraft.initial_state(), Range::Aircraft.initial_covariance());
+/// let variance = (3.0_f32 * 0.04) * (3.0 * 0.04);
+/// for (slip, friction) in [(0.05, 0.21), (0.10, 0.32), (0.15, 0.35), (0.30, 0.28)] {
+///     (x, p) = update(x, p, slip, friction, variance)?;
+/// }
+/// assert!((x.peak_friction - 0.35).abs() < 2.0 * p.peak_friction_std());
+/// # Ok::<(), muslip::filter::mu_slip::UpdateError>(())
+/// ```
+#[inline]
+pub fn update<T: Real>(
+    state: State<T>,
+    covariance: Covariance<T>,
+    slip_ratio: T,
+    friction: T,
+    measurement_variance: T,
+) -> Result<(State<T>, Covariance<T>), UpdateError> {
+    let inputs = Inputs {
+        state,
+        covariance,
+        slip_ratio,
+        friction,
+        measurement_variance,
+    };
+    let step = inputs.judged(inputs.step(ARTICLE))?;
+    Ok((step.state, step.covariance))
+}
+
+/// [`update`], bit for bit, with what it did.
+///
+/// # Errors
+/// As for [`update`].
+#[inline]
+pub fn update_reporting<T: Real>(
+    state: State<T>,
+    covariance: Covariance<T>,
+    slip_ratio: T,
+    friction: T,
+    measurement_variance: T,
+) -> Result<(Estimate<T>, Fusion<T>), UpdateError> {
+    let inputs = Inputs {
+        state,
+        covariance,
+        slip_ratio,
+        friction,
+        measurement_variance,
+    };
+    let step = inputs.judged(inputs.step(ARTICLE))?;
+    let estimate = Estimate {
+        state: step.state,
+        covariance: step.covariance,
+    };
+    Ok((estimate, step.fusion))
+}

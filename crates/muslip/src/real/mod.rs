@@ -1,0 +1,200 @@
+//! The scalar that everything here is generic over.
+//!
+//! One small trait instead of a numeric tower: a reader sees each function that costs a library call
+//! on the target, and a test can put a dual number through the very code that runs on the wheel.
+//! Host and target use the same `libm`, so they agree to the last bit up to the compiler's contraction.
+
+mod sine;
+
+use core::fmt::Debug;
+use core::ops::{Add, AddAssign, Div, DivAssign, Mul, MulAssign, Neg, Sub, SubAssign};
+
+/// A real scalar: `f32` on the target, `f64` on the host, a dual number in tests.
+///
+/// Implementations may be wrappers that carry derivatives: nothing in this crate sends a value through
+/// another type on its way, and [`Real::from_f64`] is only ever given constants.
+pub trait Real:
+    Copy
+    + Debug
+    + PartialEq
+    + PartialOrd
+    + 'static
+    + Add<Output = Self>
+    + Sub<Output = Self>
+    + Mul<Output = Self>
+    + Div<Output = Self>
+    + Neg<Output = Self>
+    + AddAssign
+    + SubAssign
+    + MulAssign
+    + DivAssign
+{
+    /// 0.
+    const ZERO: Self;
+    /// 1.
+    const ONE: Self;
+    /// 2.
+    const TWO: Self;
+    /// 1/2.
+    const HALF: Self;
+    /// Distance from 1 to the next larger number (relative spacing, dimensionless).
+    const EPSILON: Self;
+    /// Smallest positive number with full relative precision.
+    const MIN_POSITIVE: Self;
+
+    /// A constant, rounded to this type. Folded at compile time for `f32` and `f64`.
+    fn from_f64(constant: f64) -> Self;
+    /// e to the power of `self`.
+    fn exp(self) -> Self;
+    /// Natural logarithm; NaN below zero, minus infinity at zero.
+    fn ln(self) -> Self;
+    /// Square root; NaN below zero.
+    fn sqrt(self) -> Self;
+    /// Sine, argument in radians.
+    ///
+    /// `f32`: absolute error below 2e-7 for `|self| <= 4096`, NaN beyond; no double precision inside.
+    fn sin(self) -> Self;
+    /// Cosine, argument in radians. Range and error in `f32` as for [`Real::sin`].
+    fn cos(self) -> Self;
+    /// Arc tangent in radians, within ±π/2.
+    fn atan(self) -> Self;
+    /// Magnitude.
+    fn abs(self) -> Self;
+    /// True for numbers that are neither infinite nor NaN.
+    fn is_finite(self) -> bool;
+
+    /// The smaller of two; `other` where `self` is NaN.
+    #[inline]
+    fn min(self, other: Self) -> Self {
+        if self < other { self } else { other }
+    }
+
+    /// The larger of two; `other` where `self` is NaN.
+    #[inline]
+    fn max(self, other: Self) -> Self {
+        if self > other { self } else { other }
+    }
+
+    /// `self` times itself.
+    #[inline]
+    fn squared(self) -> Self {
+        self * self
+    }
+}
+
+impl Real for f32 {
+    const ZERO: Self = 0.0;
+    const ONE: Self = 1.0;
+    const TWO: Self = 2.0;
+    const HALF: Self = 0.5;
+    const EPSILON: Self = f32::EPSILON;
+    const MIN_POSITIVE: Self = f32::MIN_POSITIVE;
+
+    #[inline(always)]
+    #[expect(
+        clippy::cast_possible_truncation,
+        reason = "rounding a constant to the working precision is the purpose"
+    )]
+    fn from_f64(constant: f64) -> Self {
+        constant as f32
+    }
+    #[inline]
+    fn exp(self) -> Self {
+        libm::expf(self)
+    }
+    #[inline]
+    fn ln(self) -> Self {
+        libm::logf(self)
+    }
+    #[inline]
+    fn sqrt(self) -> Self {
+        libm::sqrtf(self)
+    }
+    // libm's sinf and cosf compute in double precision: over a thousand instructions of soft float on
+    // a single-precision FPU.
+    #[inline]
+    fn sin(self) -> Self {
+        sine::sin(self)
+    }
+    #[inline]
+    fn cos(self) -> Self {
+        sine::cos(self)
+    }
+    #[inline]
+    fn atan(self) -> Self {
+        libm::atanf(self)
+    }
+    #[inline]
+    fn abs(self) -> Self {
+        libm::fabsf(self)
+    }
+    #[inline]
+    fn is_finite(self) -> bool {
+        f32::is_finite(self)
+    }
+}
+
+impl Real for f64 {
+    const ZERO: Self = 0.0;
+    const ONE: Self = 1.0;
+    const TWO: Self = 2.0;
+    const HALF: Self = 0.5;
+    const EPSILON: Self = f64::EPSILON;
+    const MIN_POSITIVE: Self = f64::MIN_POSITIVE;
+
+    #[inline(always)]
+    fn from_f64(constant: f64) -> Self {
+        constant
+    }
+    #[inline]
+    fn exp(self) -> Self {
+        libm::exp(self)
+    }
+    #[inline]
+    fn ln(self) -> Self {
+        libm::log(self)
+    }
+    #[inline]
+    fn sqrt(self) -> Self {
+        libm::sqrt(self)
+    }
+    #[inline]
+    fn sin(self) -> Self {
+        libm::sin(self)
+    }
+    #[inline]
+    fn cos(self) -> Self {
+        libm::cos(self)
+    }
+    #[inline]
+    fn atan(self) -> Self {
+        libm::atan(self)
+    }
+    #[inline]
+    fn abs(self) -> Self {
+        libm::fabs(self)
+    }
+    #[inline]
+    fn is_finite(self) -> bool {
+        f64::is_finite(self)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Real;
+
+    #[test]
+    fn min_and_max_ignore_nan_on_the_left() {
+        assert_eq!(Real::min(f32::NAN, 2.0), 2.0);
+        assert_eq!(Real::max(f64::NAN, 2.0), 2.0);
+        assert_eq!(Real::min(1.0_f64, 2.0), 1.0);
+        assert_eq!(Real::max(1.0_f32, 2.0), 2.0);
+    }
+
+    #[test]
+    fn constants_are_rounded_to_the_nearest_number() {
+        assert_eq!(<f32 as Real>::from_f64(0.1), 0.1_f32);
+        assert_eq!(<f64 as Real>::from_f64(0.1), 0.1_f64);
+    }
+}
