@@ -1,2 +1,8 @@
 //! Rig simulator, recordings and reports behind the `muslip` command.
 #![forbid(unsafe_code)]
+
+pub mod input_error;
+pub mod output;
+pub mod recording;
+pub mod rig_file;
+pub mod simulate;

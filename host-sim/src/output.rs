@@ -1,0 +1,233 @@
+//! Files that appear whole or not at all.
+//!
+//! Everything that the tool writes goes to a temporary name in the same folder and is renamed when
+//! complete, so that a program waiting for the file never reads half of it and a run that ends early
+//! leaves an older file as it was.
+
+use std::fs::{self, File};
+use std::io::{self, BufWriter, Write};
+use std::path::{Path, PathBuf};
+
+use tempfile::NamedTempFile;
+
+/// An output that could not be written.
+#[derive(Debug, thiserror::Error)]
+#[error("{}:1:1: cannot be written: {reason}", crate::input_error::one_line(&path.to_string_lossy()))]
+pub struct OutputError {
+    /// The file as the user named it.
+    pub path: PathBuf,
+    /// The system's reason.
+    pub reason: String,
+    /// What the system answered.
+    #[source]
+    pub source: io::Error,
+}
+
+impl OutputError {
+    /// Names the file that a system error concerns.
+    pub fn new(path: &Path, source: io::Error) -> Self {
+        Self {
+            path: path.to_owned(),
+            reason: crate::input_error::system_reason(&source),
+            source,
+        }
+    }
+}
+
+/// A file under construction; nothing is at its path until [`OutputFile::commit`].
+///
+/// Dropped without a commit, it leaves no trace. A path that exists and is no regular file
+/// (`/dev/null`, a pipe) is written directly: renaming over it would replace the device.
+#[derive(Debug)]
+pub struct OutputFile {
+    path: PathBuf,
+    sink: Sink,
+}
+
+#[derive(Debug)]
+enum Sink {
+    Renamed {
+        temporary: BufWriter<NamedTempFile>,
+        destination: PathBuf,
+    },
+    Direct(BufWriter<File>),
+}
+
+impl OutputFile {
+    /// Starts an output.
+    ///
+    /// # Errors
+    /// [`OutputError`] if the folder does not exist or may not be written.
+    pub fn create(path: &Path) -> Result<Self, OutputError> {
+        let fail = |error| OutputError::new(path, error);
+        // Through a link, the file that it points at is replaced, not the link.
+        let destination = fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
+        let sink = match fs::metadata(&destination) {
+            Ok(metadata) if metadata.is_dir() => {
+                return Err(fail(io::Error::from(io::ErrorKind::IsADirectory)));
+            }
+            Ok(metadata) if !metadata.is_file() => Sink::Direct(BufWriter::new(
+                File::options()
+                    .write(true)
+                    .open(&destination)
+                    .map_err(fail)?,
+            )),
+            _ => {
+                let folder = match destination.parent() {
+                    Some(folder) if !folder.as_os_str().is_empty() => folder,
+                    _ => Path::new("."),
+                };
+                Sink::Renamed {
+                    temporary: BufWriter::with_capacity(
+                        1 << 16,
+                        temporary_in(folder).map_err(fail)?,
+                    ),
+                    destination,
+                }
+            }
+        };
+        Ok(Self {
+            path: path.to_owned(),
+            sink,
+        })
+    }
+
+    /// Puts the finished file in its place.
+    ///
+    /// # Errors
+    /// [`OutputError`] if the last bytes cannot be written or the name cannot be taken; what was at
+    /// the path before is then still there.
+    pub fn commit(self) -> Result<(), OutputError> {
+        let fail = |error| OutputError::new(&self.path, error);
+        match self.sink {
+            Sink::Renamed {
+                temporary,
+                destination,
+            } => {
+                let temporary = temporary
+                    .into_inner()
+                    .map_err(|error| fail(error.into_error()))?;
+                temporary
+                    .persist(destination)
+                    .map_err(|error| fail(error.error))?;
+            }
+            Sink::Direct(mut file) => file.flush().map_err(fail)?,
+        }
+        Ok(())
+    }
+
+    /// Names this file in a system error that came from writing to it.
+    pub fn failure(&self, source: io::Error) -> OutputError {
+        OutputError::new(&self.path, source)
+    }
+}
+
+fn temporary_in(folder: &Path) -> io::Result<NamedTempFile> {
+    let mut builder = tempfile::Builder::new();
+    builder.prefix(".muslip-").suffix(".tmp");
+    #[cfg(unix)]
+    {
+        // The rights that a plain `create` would give, less the user's umask.
+        use std::os::unix::fs::PermissionsExt;
+        builder.permissions(fs::Permissions::from_mode(0o666));
+    }
+    builder.tempfile_in(folder)
+}
+
+impl Write for OutputFile {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        match &mut self.sink {
+            Sink::Renamed { temporary, .. } => temporary.write(bytes),
+            Sink::Direct(file) => file.write(bytes),
+        }
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        match &mut self.sink {
+            Sink::Renamed { temporary, .. } => temporary.flush(),
+            Sink::Direct(file) => file.flush(),
+        }
+    }
+}
+
+/// Writes a whole file at once, with the same promise as [`OutputFile`].
+///
+/// # Errors
+/// [`OutputError`] if it cannot be created, written or renamed.
+pub fn write_file(path: &Path, contents: &[u8]) -> Result<(), OutputError> {
+    let mut file = OutputFile::create(path)?;
+    file.write_all(contents)
+        .map_err(|error| OutputError::new(path, error))?;
+    file.commit()
+}
+
+/// Makes a folder for outputs, with those above it.
+///
+/// # Errors
+/// [`OutputError`] if the folder cannot be made.
+pub fn create_folder(path: &Path) -> Result<(), OutputError> {
+    fs::create_dir_all(path).map_err(|error| OutputError::new(path, error))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_output_that_is_not_committed_leaves_the_folder_as_it_was() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("run.csv");
+        fs::write(&path, "old").unwrap();
+        let mut file = OutputFile::create(&path).unwrap();
+        file.write_all(b"half").unwrap();
+        file.flush().unwrap();
+        drop(file);
+        assert_eq!(fs::read_to_string(&path).unwrap(), "old");
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
+    }
+
+    #[test]
+    fn a_committed_output_replaces_the_old_one_and_leaves_no_temporary() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("run.csv");
+        fs::write(&path, "old").unwrap();
+        write_file(&path, b"new").unwrap();
+        assert_eq!(fs::read_to_string(&path).unwrap(), "new");
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
+    }
+
+    #[test]
+    fn a_missing_folder_is_named_in_one_line() {
+        let error = write_file(Path::new("no/such/folder/run.csv"), b"").unwrap_err();
+        assert_eq!(
+            error.to_string(),
+            "no/such/folder/run.csv:1:1: cannot be written: no such file or directory"
+        );
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_device_is_written_and_not_replaced() {
+        use std::os::unix::fs::FileTypeExt;
+        write_file(Path::new("/dev/null"), b"gone").unwrap();
+        assert!(
+            fs::metadata("/dev/null")
+                .unwrap()
+                .file_type()
+                .is_char_device()
+        );
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_link_stays_a_link() {
+        let folder = tempfile::tempdir().unwrap();
+        let target = folder.path().join("target.csv");
+        let link = folder.path().join("link.csv");
+        fs::write(&target, "old").unwrap();
+        std::os::unix::fs::symlink(&target, &link).unwrap();
+        write_file(&link, b"new").unwrap();
+        assert!(fs::symlink_metadata(&link).unwrap().is_symlink());
+        assert_eq!(fs::read_to_string(&target).unwrap(), "new");
+    }
+}

@@ -1,0 +1,301 @@
+//! Reading a recording row by row, in bounded memory.
+
+use std::fs::File;
+use std::io::{self, Read, Seek, SeekFrom};
+use std::path::{Path, PathBuf};
+
+use csv::ByteRecord;
+use muslip::sample::RigSample;
+
+use super::header::{Channel, Header, Required};
+use super::position::{Place, line_and_column};
+use super::utf8::{NotUtf8At, Utf8Reader};
+use crate::input_error::{InputError, InputProblem, quoted, system_reason};
+
+const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
+
+/// A recording on disk, to be read as often as needed.
+#[derive(Debug)]
+pub struct Recording {
+    path: PathBuf,
+    file: File,
+    /// Where the text starts: after the byte order mark, if there is one.
+    text_start: u64,
+    length_bytes: u64,
+}
+
+impl Recording {
+    /// Opens a recording. What comes through a pipe is first copied to an unnamed temporary file,
+    /// because most jobs read it twice.
+    ///
+    /// # Errors
+    /// [`InputError`] if there is no such file or it cannot be read.
+    pub fn open(path: &Path) -> Result<Self, InputError> {
+        let fail = |error| unreadable(path, &error);
+        let mut file = File::open(path).map_err(fail)?;
+        let metadata = file.metadata().map_err(fail)?;
+        if metadata.is_dir() {
+            return Err(fail(io::Error::from(io::ErrorKind::IsADirectory)));
+        }
+        let length_bytes = if metadata.is_file() {
+            metadata.len()
+        } else {
+            let mut copy = tempfile::tempfile().map_err(fail)?;
+            let length = io::copy(&mut file, &mut copy).map_err(fail)?;
+            file = copy;
+            length
+        };
+        file.rewind().map_err(fail)?;
+        let mut start = Vec::with_capacity(BYTE_ORDER_MARK.len());
+        (&file)
+            .take(BYTE_ORDER_MARK.len() as u64)
+            .read_to_end(&mut start)
+            .map_err(fail)?;
+        Ok(Self {
+            path: path.to_owned(),
+            text_start: if start == BYTE_ORDER_MARK { 3 } else { 0 },
+            file,
+            length_bytes,
+        })
+    }
+
+    /// The file as the user named it.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Size of the file, for progress bars.
+    pub fn length_bytes(&self) -> u64 {
+        self.length_bytes
+    }
+
+    /// Starts a pass over the rows from the beginning.
+    ///
+    /// # Errors
+    /// [`InputError`] if the file is empty or its header lacks a required column, has one twice, or one
+    /// without a name.
+    pub fn rows(&mut self, required: Required) -> Result<Rows<'_>, InputError> {
+        self.rewind()?;
+        let text = Utf8Reader::new(&self.file);
+        let mut csv = csv::ReaderBuilder::new()
+            .has_headers(false)
+            .flexible(true)
+            .comment(Some(b'#'))
+            .buffer_capacity(1 << 16)
+            .from_reader(text);
+        let mut record = ByteRecord::new();
+        match csv.read_byte_record(&mut record) {
+            Ok(true) => {}
+            Ok(false) => return Err(InputError::whole_file(&self.path, InputProblem::Empty)),
+            Err(error) => return Err(self.read_failure(error)),
+        }
+        let header = self.header(&record, required)?;
+        Ok(Rows {
+            recording: self,
+            csv,
+            cells: vec![f64::NAN; header.names().len()],
+            header,
+            record,
+            rows_read: 0,
+            last_time_s: f64::NEG_INFINITY,
+        })
+    }
+
+    fn header(&self, record: &ByteRecord, required: Required) -> Result<Header, InputError> {
+        let mut names: Vec<String> = Vec::with_capacity(record.len());
+        for (cell, name) in record.iter().enumerate() {
+            let name = String::from_utf8_lossy(name).trim().to_owned();
+            let problem = if name.is_empty() {
+                InputProblem::UnnamedColumn(cell + 1)
+            } else if names.contains(&name) {
+                InputProblem::ColumnTwice(quoted(&name))
+            } else {
+                names.push(name);
+                continue;
+            };
+            return Err(self.error_at_cell(0, cell, problem));
+        }
+        let header = Header::new(names);
+        for channel in required.channels() {
+            if header.index(channel).is_none() {
+                let problem = InputProblem::MissingColumn(channel.name());
+                return Err(self.error_at_cell(0, 0, problem));
+            }
+        }
+        Ok(header)
+    }
+
+    fn rewind(&self) -> Result<(), InputError> {
+        (&self.file)
+            .seek(SeekFrom::Start(self.text_start))
+            .map(|_| ())
+            .map_err(|error| unreadable(&self.path, &error))
+    }
+
+    fn error_at_cell(&self, record_from: u64, cell: usize, problem: InputProblem) -> InputError {
+        self.error_at(Place::Cell { record_from, cell }, problem)
+    }
+
+    fn error_at(&self, place: Place, problem: InputProblem) -> InputError {
+        // If the second look at the file fails, the problem is still told, at its beginning.
+        let (line, column) = self
+            .rewind()
+            .ok()
+            .and_then(|()| line_and_column(&self.file, place).ok())
+            .unwrap_or((1, 1));
+        InputError {
+            path: self.path.clone(),
+            line,
+            column,
+            problem,
+        }
+    }
+
+    fn read_failure(&self, error: csv::Error) -> InputError {
+        let error = io::Error::from(error);
+        match error
+            .get_ref()
+            .and_then(|inner| inner.downcast_ref::<NotUtf8At>())
+        {
+            Some(&NotUtf8At(byte)) => self.error_at(Place::Byte(byte), InputProblem::NotUtf8),
+            None => unreadable(&self.path, &error),
+        }
+    }
+}
+
+fn unreadable(path: &Path, error: &io::Error) -> InputError {
+    InputError::whole_file(path, InputProblem::Unreadable(system_reason(error)))
+}
+
+/// One pass over the rows of a recording.
+#[derive(Debug)]
+pub struct Rows<'a> {
+    recording: &'a Recording,
+    csv: csv::Reader<Utf8Reader<&'a File>>,
+    header: Header,
+    record: ByteRecord,
+    cells: Vec<f64>,
+    rows_read: u64,
+    last_time_s: f64,
+}
+
+impl Rows<'_> {
+    /// The header row.
+    pub fn header(&self) -> &Header {
+        &self.header
+    }
+
+    /// Bytes of the file gone through so far, for progress bars.
+    pub fn bytes_read(&self) -> u64 {
+        self.csv.get_ref().bytes_passed()
+    }
+
+    /// Reads the next row; `None` after the last one.
+    ///
+    /// # Errors
+    /// [`InputError`] with line and column: a row with too many or too few cells, a cell that is no
+    /// number, bytes that are not UTF-8, a time that repeats or goes back, or no row at all.
+    pub fn next_row(&mut self) -> Result<Option<Row<'_>>, InputError> {
+        match self.csv.read_byte_record(&mut self.record) {
+            Ok(true) => {}
+            Ok(false) if self.rows_read == 0 => {
+                return Err(self
+                    .recording
+                    .error_at_cell(0, usize::MAX, InputProblem::HeaderOnly));
+            }
+            Ok(false) => return Ok(None),
+            Err(error) => return Err(self.recording.read_failure(error)),
+        }
+        self.rows_read += 1;
+        let (expected, found) = (self.cells.len(), self.record.len());
+        if expected != found {
+            return Err(self.error(
+                expected.min(found),
+                InputProblem::CellCount { expected, found },
+            ));
+        }
+        for (index, (cell, value)) in self.record.iter().zip(&mut self.cells).enumerate() {
+            match parse_cell(cell) {
+                Some(number) => *value = number,
+                None => {
+                    let problem = InputProblem::NotANumber {
+                        column: self.header.names().get(index).cloned().unwrap_or_default(),
+                        cell: quoted(&String::from_utf8_lossy(cell)),
+                    };
+                    return Err(self.error(index, problem));
+                }
+            }
+        }
+        self.check_time()?;
+        Ok(Some(Row {
+            header: &self.header,
+            cells: &self.cells,
+        }))
+    }
+
+    fn check_time(&mut self) -> Result<(), InputError> {
+        let now = self.header.value(&self.cells, Channel::Time);
+        // A missing or infinite time orders nothing; the rows around it must still be in order.
+        if !now.is_finite() {
+            return Ok(());
+        }
+        let before = self.last_time_s;
+        if now <= before {
+            let problem = if now == before {
+                InputProblem::TimeRepeats(now.to_string())
+            } else {
+                InputProblem::TimeGoesBack {
+                    before: before.to_string(),
+                    now: now.to_string(),
+                }
+            };
+            let cell = self.header.index(Channel::Time).unwrap_or_default();
+            return Err(self.error(cell, problem));
+        }
+        self.last_time_s = now;
+        Ok(())
+    }
+
+    fn error(&self, cell: usize, problem: InputProblem) -> InputError {
+        let record_from = self.record.position().map_or(0, csv::Position::byte);
+        self.recording.error_at_cell(record_from, cell, problem)
+    }
+}
+
+/// A cell as a number; missing is `NaN`, and text that is neither is `None`.
+fn parse_cell(cell: &[u8]) -> Option<f64> {
+    let cell = cell.trim_ascii();
+    if cell.is_empty() {
+        return Some(f64::NAN);
+    }
+    str::from_utf8(cell).ok()?.parse().ok()
+}
+
+/// One row of a recording.
+#[derive(Debug, Clone, Copy)]
+pub struct Row<'a> {
+    header: &'a Header,
+    cells: &'a [f64],
+}
+
+impl Row<'_> {
+    /// All cells in file order; a missing one is `NaN`.
+    pub fn cells(&self) -> &[f64] {
+        self.cells
+    }
+
+    /// The value of a channel; `NaN` where it is missing or the recording has no such column.
+    pub fn value(&self, channel: Channel) -> f64 {
+        self.header.value(self.cells, channel)
+    }
+
+    /// Time of the row in s.
+    pub fn time_s(&self) -> f64 {
+        self.value(Channel::Time)
+    }
+
+    /// The four channels of which slip and friction are made.
+    pub fn rig_sample(&self) -> RigSample<f64> {
+        self.header.rig_sample(self.cells)
+    }
+}
