@@ -24,11 +24,11 @@ pub(super) enum Place {
 pub(super) fn line_and_column(text: impl Read, place: Place) -> io::Result<(u64, u64)> {
     let mut walk = Walk::new(text);
     match place {
-        Place::Byte(byte) => walk.to_byte(byte)?,
+        Place::Byte(byte) => walk.walk_to_byte(byte)?,
         Place::Cell { record_from, cell } => {
-            walk.to_byte(record_from)?;
-            walk.to_record()?;
-            walk.to_cell(cell)?;
+            walk.walk_to_byte(record_from)?;
+            walk.walk_to_record()?;
+            walk.walk_to_cell(cell)?;
         }
     }
     Ok((walk.line, walk.column))
@@ -74,7 +74,7 @@ impl<R: Read> Walk<R> {
         self.after_return = byte == b'\r';
     }
 
-    fn to_byte(&mut self, target: u64) -> io::Result<()> {
+    fn walk_to_byte(&mut self, target: u64) -> io::Result<()> {
         while self.byte < target {
             match self.peek()? {
                 Some(byte) => self.step(byte),
@@ -85,7 +85,7 @@ impl<R: Read> Walk<R> {
     }
 
     /// Skips line ends and comment lines.
-    fn to_record(&mut self) -> io::Result<()> {
+    fn walk_to_record(&mut self) -> io::Result<()> {
         let mut in_comment = false;
         while let Some(byte) = self.peek()? {
             match byte {
@@ -99,7 +99,7 @@ impl<R: Read> Walk<R> {
         Ok(())
     }
 
-    fn to_cell(&mut self, cell: usize) -> io::Result<()> {
+    fn walk_to_cell(&mut self, cell: usize) -> io::Result<()> {
         let mut passed = 0;
         let mut state = InCell::Start;
         while passed < cell {
