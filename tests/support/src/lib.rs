@@ -1,1 +1,9 @@
 //! Tolerances, seeded noise and reference scenarios shared by the tests.
+#![forbid(unsafe_code)]
+
+pub mod noise;
+pub mod scenario;
+pub mod tolerance;
+
+pub use noise::Noise;
+pub use tolerance::Tolerance;

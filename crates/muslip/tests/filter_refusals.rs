@@ -1,0 +1,222 @@
+//! What the two-state filter refuses, and that a refusal changes nothing.
+
+use muslip::filter::mu_slip::{
+    Config, Covariance, CovarianceForm, Estimate, Input, MuSlipFilter, Range, State, UpdateError,
+    update, update_reporting,
+};
+use muslip::filter::{Estimator, FrictionMeasurement};
+
+const BAD: [f32; 3] = [f32::NAN, f32::INFINITY, f32::NEG_INFINITY];
+
+fn state() -> State<f32> {
+    Range::Aircraft.initial_state()
+}
+
+fn covariance() -> Covariance<f32> {
+    Range::Aircraft.initial_covariance()
+}
+
+/// The refusal of both free functions, which must be the same.
+fn refusal(
+    state: State<f32>,
+    covariance: Covariance<f32>,
+    slip: f32,
+    friction: f32,
+    variance: f32,
+) -> UpdateError {
+    let lean = update(state, covariance, slip, friction, variance).unwrap_err();
+    let reporting = update_reporting(state, covariance, slip, friction, variance).unwrap_err();
+    assert_eq!(lean, reporting);
+    lean
+}
+
+#[test]
+fn each_input_that_is_not_finite_is_named_at_every_slip() {
+    // slip 0 makes H zero, which hides infinities from the gain
+    for slip in [0.0, 0.1, 0.2, 1.0] {
+        for bad in BAD {
+            for change in [
+                |x: &mut State<f32>, bad| x.peak_friction = bad,
+                |x: &mut State<f32>, bad| x.critical_slip = bad,
+            ] {
+                let mut x = state();
+                change(&mut x, bad);
+                let got = refusal(x, covariance(), slip, 0.3, 0.0144);
+                assert_eq!(got, UpdateError::NonFinite(Input::State));
+            }
+            for change in [
+                |p: &mut Covariance<f32>, bad| p.p00 = bad,
+                |p: &mut Covariance<f32>, bad| p.p01 = bad,
+                |p: &mut Covariance<f32>, bad| p.p11 = bad,
+            ] {
+                let mut p = covariance();
+                change(&mut p, bad);
+                let got = refusal(state(), p, slip, 0.3, 0.0144);
+                assert_eq!(got, UpdateError::NonFinite(Input::Covariance));
+            }
+            let named = |input| UpdateError::NonFinite(input);
+            assert_eq!(
+                refusal(state(), covariance(), bad, 0.3, 0.0144),
+                named(Input::SlipRatio)
+            );
+            assert_eq!(
+                refusal(state(), covariance(), slip, bad, 0.0144),
+                named(Input::Friction)
+            );
+            assert_eq!(
+                refusal(state(), covariance(), slip, 0.3, bad),
+                named(Input::Noise)
+            );
+        }
+    }
+}
+
+#[test]
+fn noise_must_be_positive() {
+    for variance in [0.0, -0.0, -0.01] {
+        let got = refusal(state(), covariance(), 0.1, 0.3, variance);
+        assert_eq!(got, UpdateError::NonPositiveNoise);
+    }
+}
+
+#[test]
+fn a_prior_that_is_not_positive_definite_is_refused() {
+    for (p00, p01, p11) in [
+        (-0.36, 0.0, 0.04),
+        (0.36, 0.0, -0.04),
+        (0.36, 0.13, 0.04),
+        (0.36, -0.13, 0.04),
+        (1.0, 2.0, 1.0),
+        (0.0, 0.0, 0.04),
+        (0.0, 0.0, 0.0),
+    ] {
+        for slip in [0.0, 0.05, 0.2, 0.9] {
+            let p = Covariance { p00, p01, p11 };
+            let got = refusal(state(), p, slip, 0.3, 0.0144);
+            assert_eq!(got, UpdateError::PriorNotPositiveDefinite, "{p:?}");
+        }
+    }
+}
+
+#[test]
+fn a_measurement_too_certain_for_the_precision_is_refused_and_not_clamped() {
+    // At the peak H = (1, 0): the posterior variance of peak friction is the noise, 1e-16 of the prior's.
+    let x = State {
+        peak_friction: 0.6,
+        critical_slip: 0.2,
+    };
+    let p = Covariance {
+        p00: 0.36,
+        p01: 0.0,
+        p11: 1e-10,
+    };
+    assert_eq!(
+        refusal(x, p, 0.2, 0.5, 1e-17),
+        UpdateError::PosteriorNotPositiveDefinite
+    );
+    // Double precision can hold what single precision cannot.
+    let x = State {
+        peak_friction: 0.6,
+        critical_slip: 0.2,
+    };
+    let p = Covariance {
+        p00: 0.36,
+        p01: 0.0,
+        p11: 1e-10,
+    };
+    assert!(update(x, p, 0.2, 0.5, 1e-13_f64).is_ok());
+}
+
+#[test]
+fn overflow_of_finite_inputs_is_an_error() {
+    assert_eq!(
+        refusal(state(), covariance(), 1e30, 0.3, 0.0144),
+        UpdateError::Overflow
+    );
+    let x = State {
+        peak_friction: 0.6,
+        critical_slip: 0.0,
+    };
+    assert_eq!(
+        refusal(x, covariance(), 0.0, 0.3, 0.0144),
+        UpdateError::Overflow
+    );
+}
+
+fn filters() -> [MuSlipFilter<f32>; 2] {
+    [CovarianceForm::Short, CovarianceForm::Joseph].map(|covariance_form| {
+        let config = Config {
+            covariance_form,
+            nis_gate: Some(9.0),
+            ..Config::default()
+        };
+        config.build().unwrap()
+    })
+}
+
+#[test]
+fn a_refusal_leaves_the_filter_as_it_was() {
+    for mut filter in filters() {
+        let good = FrictionMeasurement {
+            slip_ratio: 0.1,
+            friction: 0.4,
+            friction_std: 0.04,
+        };
+        filter.update(&good).unwrap();
+        let before = filter;
+        for bad in BAD {
+            let mut refused = |change: fn(&mut FrictionMeasurement<f32>, f32), input| {
+                let mut measurement = good;
+                change(&mut measurement, bad);
+                let got = filter.update(&measurement);
+                assert_eq!(got, Err(UpdateError::NonFinite(input)), "{measurement:?}");
+                assert_eq!(filter, before);
+            };
+            refused(|m, bad| m.slip_ratio = bad, Input::SlipRatio);
+            refused(|m, bad| m.friction = bad, Input::Friction);
+        }
+        for friction_std in [0.0, -0.04, f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
+            let measurement = FrictionMeasurement {
+                friction_std,
+                ..good
+            };
+            assert!(filter.update(&measurement).is_err());
+            assert_eq!(filter, before);
+        }
+        let unsound = Estimate {
+            state: state(),
+            covariance: Covariance {
+                p00: 1.0,
+                p01: 2.0,
+                p11: 1.0,
+            },
+        };
+        assert_eq!(
+            filter.restore(unsound),
+            Err(UpdateError::PriorNotPositiveDefinite)
+        );
+        assert_eq!(filter, before);
+    }
+}
+
+#[test]
+fn an_estimate_that_was_copied_out_can_be_restored() {
+    for mut filter in filters() {
+        let start = filter.estimate();
+        let measurement = FrictionMeasurement {
+            slip_ratio: 0.1,
+            friction: 0.4,
+            friction_std: 0.04,
+        };
+        filter.update(&measurement).unwrap();
+        let later = filter.estimate();
+        assert_ne!(start, later);
+        filter.reset();
+        assert_eq!(filter.estimate(), start);
+        filter.restore(later).unwrap();
+        assert_eq!(filter.estimate(), later);
+        let peak = filter.peak();
+        assert_eq!(peak.peak_friction, later.state.peak_friction);
+        assert_eq!(peak.correlation, later.covariance.correlation());
+    }
+}
