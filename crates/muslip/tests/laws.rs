@@ -37,7 +37,7 @@ fn agrees<L, const N: usize>(
 {
     let parameters = law.parameters();
     let (value, gradient, hessian) = hessian(
-        |p: SVector<Dual2SVec64<N>, N>| transcription(p.data.0[0].clone(), slip.into()),
+        |p: SVector<Dual2SVec64<N>, N>| transcription(p.data.0[0], slip.into()),
         &parameters,
     );
     let near = Tolerance {

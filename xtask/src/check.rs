@@ -1,0 +1,38 @@
+//! `cargo xtask check`: formatting, lints, documentation.
+
+use anyhow::Result;
+
+use crate::step::{cargo, run};
+
+/// Runs the three; the first that fails ends it.
+pub fn run_all() -> Result<()> {
+    run("formatting", cargo(&["fmt", "--all", "--check"]))?;
+    run(
+        "clippy",
+        cargo(&[
+            "clippy",
+            "--workspace",
+            "--all-targets",
+            "--locked",
+            "--",
+            "-D",
+            "warnings",
+        ]),
+    )?;
+    run(
+        "clippy of the core's features",
+        cargo(&[
+            "clippy",
+            "--package",
+            "muslip",
+            "--all-features",
+            "--locked",
+            "--",
+            "-D",
+            "warnings",
+        ]),
+    )?;
+    let mut documentation = cargo(&["doc", "--workspace", "--no-deps", "--locked"]);
+    documentation.env("RUSTDOCFLAGS", "-D warnings");
+    run("documentation", documentation)
+}

@@ -1,0 +1,57 @@
+//! One child process with its name and time, and where the workspace is.
+
+use std::path::PathBuf;
+use std::process::{Command, Stdio};
+use std::time::Instant;
+
+use anyhow::{Context, Result, bail};
+
+/// The root of the workspace.
+pub fn root() -> PathBuf {
+    PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/.."))
+}
+
+/// `cargo` with these arguments, in the root, without standard input.
+pub fn cargo(arguments: &[&str]) -> Command {
+    // The cargo that runs this, so that a `+toolchain` carries over.
+    command(
+        &std::env::var("CARGO").unwrap_or_else(|_| "cargo".into()),
+        arguments,
+    )
+}
+
+/// A program with these arguments, in the root, without standard input.
+pub fn command(program: &str, arguments: &[&str]) -> Command {
+    let mut command = Command::new(program);
+    command
+        .args(arguments)
+        .current_dir(root())
+        .stdin(Stdio::null());
+    command
+}
+
+/// Does `work` under a heading and says how long it took.
+pub fn step<T>(name: &str, work: impl FnOnce() -> Result<T>) -> Result<T> {
+    println!("==> {name}");
+    let start = Instant::now();
+    let result = work();
+    let outcome = if result.is_ok() { "done" } else { "FAILED" };
+    println!(
+        "==> {name}: {outcome} in {:.1} s",
+        start.elapsed().as_secs_f64()
+    );
+    result
+}
+
+/// Runs a command as a step that fails unless it succeeds.
+pub fn run(name: &str, mut command: Command) -> Result<()> {
+    step(name, || {
+        let status = command
+            .status()
+            .with_context(|| format!("cannot start {command:?}"))?;
+        if !status.success() {
+            bail!("{name}: {status}");
+        }
+        Ok(())
+    })
+}

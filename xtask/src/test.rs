@@ -1,0 +1,165 @@
+//! `cargo xtask test`: every test there is.
+
+use std::io::{BufRead, BufReader};
+use std::process::{Command, Stdio};
+
+use anyhow::{Context, Result, bail};
+
+use crate::setup::{self, TARGETS};
+use crate::step::{cargo, run, step};
+
+/// Packages whose `#[ignore]`d tests are long rather than broken: run in release.
+const LONG_TESTS: &[&str] = &["muslip"];
+
+/// Feature sets of the core; neither may change whether it builds.
+const CORE_FEATURES: [&str; 4] = ["", "defmt", "serde", "defmt,serde"];
+
+/// Sums of the test harness's result lines.
+#[derive(Debug, Default, Clone, Copy, PartialEq, Eq)]
+struct Tally {
+    passed: u64,
+    failed: u64,
+    ignored: u64,
+}
+
+/// Installs what is missing, runs everything, and closes with the number of tests.
+///
+/// A failing test does not stop the others; a build that fails does.
+pub fn run_all() -> Result<()> {
+    setup::run_all()?;
+
+    let workspace = tests(
+        "tests of the workspace",
+        cargo(&["test", "--workspace", "--locked", "--no-fail-fast"]),
+    )?;
+
+    let mut long = cargo(&["test", "--release", "--locked", "--no-fail-fast"]);
+    for package in LONG_TESTS {
+        long.args(["--package", package]);
+    }
+    long.args(["--", "--ignored"]);
+    let long = tests("long tests, in release", long)?;
+
+    // The core's validated deserialisation and the like exist only with the features on.
+    let features = tests(
+        "tests of the core with all features",
+        cargo(&[
+            "test",
+            "--package",
+            "muslip",
+            "--all-features",
+            "--locked",
+            "--no-fail-fast",
+        ]),
+    )?;
+
+    for target in TARGETS {
+        for features in CORE_FEATURES {
+            let name = if features.is_empty() {
+                "none"
+            } else {
+                features
+            };
+            run(
+                &format!("core for {target}, features: {name}"),
+                cargo(&[
+                    "build",
+                    "--package",
+                    "muslip",
+                    "--lib",
+                    "--locked",
+                    "--quiet",
+                    "--target",
+                    target,
+                    "--features",
+                    features,
+                ]),
+            )?;
+        }
+    }
+
+    let passed = workspace.passed + long.passed + features.passed;
+    let failed = workspace.failed + long.failed + features.failed;
+    println!("{passed} passed, {failed} failed");
+    if failed > 0 {
+        bail!("{failed} tests failed");
+    }
+    let long_run = long.passed + long.failed;
+    if workspace.ignored != long_run {
+        bail!(
+            "{} tests are ignored but {long_run} were run as long ones: LONG_TESTS misses a package",
+            workspace.ignored
+        );
+    }
+    Ok(())
+}
+
+/// Runs a `cargo test`, passing its output on, and sums its results.
+///
+/// An error if it failed without a failing test to show for it: then something did not build.
+fn tests(name: &str, mut command: Command) -> Result<Tally> {
+    step(name, || {
+        let mut child = command
+            .stdout(Stdio::piped())
+            .spawn()
+            .with_context(|| format!("cannot start {command:?}"))?;
+        let output = child.stdout.take().context("standard output is piped")?;
+        let mut tally = Tally::default();
+        for line in BufReader::new(output).lines() {
+            let line = line?;
+            println!("{line}");
+            tally.add(&line);
+        }
+        let status = child.wait()?;
+        if !status.success() && tally.failed == 0 {
+            bail!("{name}: {status}");
+        }
+        Ok(tally)
+    })
+}
+
+impl Tally {
+    /// Adds a line such as `test result: ok. 27 passed; 0 failed; 1 ignored; 0 measured; ...`.
+    fn add(&mut self, line: &str) {
+        let Some((_, counts)) = line
+            .strip_prefix("test result: ")
+            .and_then(|rest| rest.split_once(". "))
+        else {
+            return;
+        };
+        for part in counts.split("; ") {
+            match part.split_once(' ') {
+                Some((count, "passed")) => self.passed += count.parse().unwrap_or(0),
+                Some((count, "failed")) => self.failed += count.parse().unwrap_or(0),
+                Some((count, "ignored")) => self.ignored += count.parse().unwrap_or(0),
+                _ => {}
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Tally;
+
+    #[test]
+    fn result_lines_are_summed_and_others_are_not() {
+        let mut tally = Tally::default();
+        for line in [
+            "test result: ok. 27 passed; 0 failed; 1 ignored; 0 measured; 0 filtered out; finished in 0.03s",
+            "test result: FAILED. 3 passed; 2 failed; 0 ignored; 0 measured; 9 filtered out; finished in 1.00s",
+            "test real::sine::tests::zero_and_sign_are_exact ... ok",
+            "99 passed; 99 failed",
+        ] {
+            tally.add(line);
+        }
+        assert_eq!(
+            tally,
+            Tally {
+                passed: 30,
+                failed: 2,
+                ignored: 1
+            }
+        );
+    }
+}
