@@ -32,7 +32,8 @@ pub fn run_all() -> Result<()> {
             "warnings",
         ]),
     )?;
-    let mut documentation = cargo(&["doc", "--workspace", "--no-deps", "--locked"]);
+    // Libraries only: the command and the core are both called muslip and would overwrite each other.
+    let mut documentation = cargo(&["doc", "--workspace", "--lib", "--no-deps", "--locked"]);
     documentation.env("RUSTDOCFLAGS", "-D warnings");
     run("documentation", documentation)
 }

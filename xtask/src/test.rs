@@ -40,14 +40,17 @@ pub fn run_all() -> Result<()> {
     long.args(["--", "--ignored"]);
     let long = tests("long tests, in release", long)?;
 
-    // The core's validated deserialisation and the like exist only with the features on.
+    // These exist only with the feature on.
     let features = tests(
-        "tests of the core with all features",
+        "tests of the core's serialisation",
         cargo(&[
             "test",
             "--package",
             "muslip",
-            "--all-features",
+            "--features",
+            "serde",
+            "--test",
+            "serialised",
             "--locked",
             "--no-fail-fast",
         ]),
