@@ -50,8 +50,17 @@ impl Range {
 /// Which of two equal expressions computes the covariance after an update.
 ///
 /// Both give the same number but for rounding. The short form is the article's and what `std` and
-/// traces report. Joseph's form, a sum of squares, loses less when a measurement is far more certain
-/// than the prior, and costs about twice the multiplications of the whole update.
+/// traces report. Joseph's form, a sum of squares, about doubles the multiplications of an update and
+/// earns them where a measurement is far more certain than the prior. Largest relative error of a
+/// variance in `f32` after one update of a random prior (standard deviations up to 1, correlation up to
+/// ±0.99), by `cargo test -p muslip --test precision -- --nocapture`:
+///
+/// | inflated noise, std | short | Joseph |
+/// |---|---|---|
+/// | 0.05..0.3 | 5e-5 | below 5e-6 |
+/// | 0.001..0.01 | 6e-2 | 6e-6 |
+///
+/// Runs from the stated starts stay within 1e-5 of `f64` in the short form down to a noise of 0.001.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(

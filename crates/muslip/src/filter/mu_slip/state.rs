@@ -147,13 +147,20 @@ impl<T: Real> Covariance<T> {
     /// deviations of some 1e-8, below the resolution of the state itself).
     #[inline]
     pub fn is_positive_definite(&self) -> bool {
+        let (definite, product) = self.pivots();
+        definite && product.is_finite()
+    }
+
+    /// Whether both pivots are positive, and P11 P22, which must be finite for that to be the answer.
+    #[inline(always)]
+    pub(super) fn pivots(&self) -> (bool, T) {
         let product = self.p00 * self.p11;
         let margin = T::ONE - T::from_f64(4.0) * T::EPSILON;
-        self.p00 > T::ZERO
-            && self.p11 > T::ZERO
-            && product * T::EPSILON >= T::MIN_POSITIVE
-            && product.is_finite()
-            && self.p01 * self.p01 < product * margin
+        // Added rather than compared: one comparison fewer in the loop of a controller. The product is
+        // then positive, so P22 has the sign of P11.
+        let smallest = T::MIN_POSITIVE / T::EPSILON;
+        let definite = self.p00 > T::ZERO && self.p01 * self.p01 + smallest < product * margin;
+        (definite, product)
     }
 }
 

@@ -168,11 +168,13 @@ impl<T: Real> Inputs<T> {
     #[inline(always)]
     pub(super) fn judged(&self, step: Step<T>) -> Result<Step<T>, UpdateError> {
         let variance = step.fusion.innovation_variance;
+        let (definite, product) = step.covariance.pivots();
+        // A sum is finite only if each term is.
+        let all = step.state.peak_friction + step.state.critical_slip + variance + product;
         let sound = self.measurement_variance > T::ZERO
             && variance > T::ZERO
-            && variance.is_finite()
-            && step.state.is_finite()
-            && step.covariance.is_positive_definite();
+            && definite
+            && all.is_finite();
         if sound { Ok(step) } else { Err(self.reason()) }
     }
 
