@@ -77,6 +77,8 @@ fn errors(form: CovarianceForm, smallest_std: f64, largest_std: f64) -> (f64, f6
 fn the_short_form_keeps_four_digits_while_noise_is_above_a_twentieth() {
     let (median, largest) = errors(CovarianceForm::Short, 0.05, 0.3);
     assert!(median < 1e-7 && largest < 1e-4);
+    let (_, joseph) = errors(CovarianceForm::Joseph, 0.05, 0.3);
+    assert!(joseph < 5e-6);
 }
 
 #[test]
