@@ -103,6 +103,9 @@ pub enum InputProblem {
     /// Every row was read, and none can serve as a measurement.
     #[error("no usable sample: {0}")]
     NoUsableSample(String),
+    /// The usable samples do not hold a curve.
+    #[error("no curve: {0}")]
+    NoCurve(String),
 }
 
 /// Puts a cell or a name into a message: quoted, on one line, at most 40 characters of it.

@@ -1,9 +1,16 @@
 //! Rig simulator, recordings and reports behind the `muslip` command.
 #![forbid(unsafe_code)]
 
+pub mod cli;
+pub mod demo;
+pub mod estimate;
 pub mod fit;
 pub mod input_error;
+pub mod measure;
 pub mod output;
 pub mod recording;
+pub mod report;
 pub mod rig_file;
 pub mod simulate;
+pub mod thin;
+pub mod wording;

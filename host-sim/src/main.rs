@@ -1,2 +1,6 @@
-//! The `muslip` command.
-fn main() {}
+//! The `muslip` command; everything it does is in `host_sim::cli`.
+#![forbid(unsafe_code)]
+
+fn main() -> std::process::ExitCode {
+    host_sim::cli::main()
+}

@@ -24,6 +24,14 @@ impl Curve {
     pub fn friction(&self, slip_ratio: f64) -> f64 {
         self.peak_friction * unit_friction(slip_ratio, self.critical_slip)
     }
+
+    /// Derivatives of friction at a slip with respect to (mup, sp).
+    pub fn gradient(&self, slip_ratio: f64) -> (f64, f64) {
+        (
+            unit_friction(slip_ratio, self.critical_slip),
+            self.peak_friction * unit_slope(slip_ratio, self.critical_slip),
+        )
+    }
 }
 
 /// Friction of the law with mup = 1, which is also its derivative with respect to mup.
@@ -175,8 +183,7 @@ fn covariance(
 ) -> Result<(f64, (f64, f64, f64)), FitError> {
     let (mut sum, mut j11, mut j12, mut j22) = (0.0, 0.0, 0.0, 0.0);
     for (&slip, &friction) in slips.iter().zip(frictions) {
-        let by_peak = unit_friction(slip, curve.critical_slip);
-        let by_slip = curve.peak_friction * unit_slope(slip, curve.critical_slip);
+        let (by_peak, by_slip) = curve.gradient(slip);
         let residual = friction - curve.peak_friction * by_peak;
         sum += residual * residual;
         j11 += by_peak * by_peak;

@@ -126,7 +126,11 @@ impl Scenario {
         )]
     }
 
-    fn check(&self) -> Result<(), ScenarioError> {
+    /// Whether the run can be made.
+    ///
+    /// # Errors
+    /// [`ScenarioError::NotPositive`] naming the value.
+    pub fn check(&self) -> Result<(), ScenarioError> {
         for (name, value) in [
             ("speed", self.speed_m_s),
             ("normal force", self.normal_force_n),
@@ -151,7 +155,7 @@ impl Scenario {
             ramp_nm_s: peak_torque_nm / (0.5 * period_s),
             largest_torque_nm: 1.5 * peak_torque_nm,
             skid_slip_ratio: 0.98,
-            skid_hold_s: 0.08 * period_s,
+            skid_hold_s: 0.02 * period_s,
             hydraulic_lag_s: 0.01,
         }
     }

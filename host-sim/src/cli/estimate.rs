@@ -1,0 +1,230 @@
+//! `muslip estimate`.
+
+use std::path::{Path, PathBuf};
+
+use clap::{Args, ValueEnum};
+use muslip::filter::mu_slip::Range;
+
+use super::Failure;
+use super::progress::Progress;
+use super::terminal::Terminal;
+use crate::estimate::{
+    EstimateError, EstimateOptions, EstimateResult, EstimatorKind, TraceFormat, TraceWriter,
+    estimate,
+};
+use crate::output::{OutputError, OutputFile, write_file};
+use crate::recording::Recording;
+use crate::report::{CurveLabel, of_estimate};
+use crate::rig_file::RigFile;
+use crate::wording::{consistency_sentence, noise_sentence, verdict_sentence};
+
+/// Estimate peak friction and the slip of the peak from one recording, sample by sample.
+///
+/// Every row with finite values, a vehicle speed of at least 0.5 m/s, a normal force of at least 2 % of
+/// the recording's median and a slip between 0 and 1 (with a margin of 0.05 for noise) is a measurement;
+/// others are skipped and counted.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:\n  \
+muslip estimate --rig rig.toml run.csv\n  \
+muslip estimate --rig rig.toml --range automotive --report run.html run.csv\n  \
+muslip estimate --rig rig.toml --trace trace.csv --json run.csv")]
+pub(super) struct Arguments {
+    /// Rig file (TOML).
+    #[arg(long, value_name = "RIG.toml")]
+    rig: PathBuf,
+    /// Where the filter starts: peak friction 0.6 (aircraft) or 1.0 (automotive), each give or take
+    /// itself.
+    #[arg(long, value_enum, default_value_t = RangeChoice::Aircraft)]
+    range: RangeChoice,
+    /// Which filter estimates.
+    #[arg(long, value_enum, default_value_t = EstimatorChoice::Article)]
+    estimator: EstimatorChoice,
+    /// Compensate the effects of a model that a diagnosis wrote.
+    #[arg(long, value_name = "MODEL.toml")]
+    model: Option<PathBuf>,
+    /// Write the estimate after every sample: CSV, or JSON where the name ends in .json or .jsonl.
+    #[arg(long, value_name = "TRACE.csv")]
+    trace: Option<PathBuf>,
+    /// Write a report with plots.
+    #[arg(long, value_name = "OUT.html")]
+    report: Option<PathBuf>,
+    /// Print one JSON object and nothing else.
+    #[arg(long)]
+    json: bool,
+    /// The recording (CSV).
+    #[arg(value_name = "RUN.csv")]
+    recording: PathBuf,
+}
+
+/// `--range`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(super) enum RangeChoice {
+    Aircraft,
+    Automotive,
+}
+
+impl From<RangeChoice> for Range {
+    fn from(choice: RangeChoice) -> Self {
+        match choice {
+            RangeChoice::Aircraft => Self::Aircraft,
+            RangeChoice::Automotive => Self::Automotive,
+        }
+    }
+}
+
+/// `--estimator`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum EstimatorChoice {
+    /// The article's extended Kalman filter.
+    Article,
+    /// Not part of this version.
+    Efficient,
+}
+
+pub(super) fn run(arguments: &Arguments, terminal: &mut Terminal) -> Result<(), Failure> {
+    let estimator = match arguments.estimator {
+        EstimatorChoice::Article => EstimatorKind::Article,
+        EstimatorChoice::Efficient => {
+            return Err(Failure::Usage(
+                "--estimator efficient is not part of this version; use article".into(),
+            ));
+        }
+    };
+    if arguments.model.is_some() {
+        return Err(Failure::Usage(
+            "--model is not part of this version: the estimate takes the rig file's tyre, radius and noise alone"
+                .into(),
+        ));
+    }
+    let job = Job {
+        rig_path: &arguments.rig,
+        recording_path: &arguments.recording,
+        options: EstimateOptions {
+            estimator,
+            range: arguments.range.into(),
+        },
+        trace: arguments.trace.as_deref(),
+        report: arguments.report.as_deref(),
+        beside: None,
+    };
+    let result = job.run()?;
+    if arguments.json {
+        return terminal.json(&result.to_json());
+    }
+    terminal.headline(&format!(
+        "{}: {}",
+        arguments.recording.display(),
+        verdict_sentence(&result.peak)
+    ))?;
+    terminal.line("")?;
+    tell(&result, terminal)?;
+    for path in [&arguments.trace, &arguments.report].into_iter().flatten() {
+        terminal.line(&format!("Written: {}", path.display()))?;
+    }
+    Ok(())
+}
+
+/// An estimate with its files; the demo runs one too.
+pub(super) struct Job<'a> {
+    pub(super) rig_path: &'a Path,
+    pub(super) recording_path: &'a Path,
+    pub(super) options: EstimateOptions,
+    pub(super) trace: Option<&'a Path>,
+    pub(super) report: Option<&'a Path>,
+    pub(super) beside: Option<CurveLabel>,
+}
+
+impl Job<'_> {
+    pub(super) fn run(&self) -> Result<EstimateResult, Failure> {
+        let rig = RigFile::read(self.rig_path)?;
+        let mut recording = Recording::open(self.recording_path)?;
+        let mut progress = Progress::new("estimate", 2 * recording.length_bytes());
+        let mut report_bytes = |bytes| progress.done(bytes);
+        // Outputs are begun before the work, so that a folder that is not there is told at once.
+        let report = self.report.map(OutputFile::create).transpose()?;
+        drop(report);
+        let mut trace = match self.trace {
+            Some(path) => {
+                let file = OutputFile::create(path)?;
+                let writer = TraceWriter::new(file, TraceFormat::of(path));
+                Some(writer.map_err(|error| OutputError::new(path, error))?)
+            }
+            None => None,
+        };
+        let result = estimate(
+            &mut recording,
+            &rig,
+            self.options,
+            trace.as_mut(),
+            &mut report_bytes,
+        )
+        .map_err(|error| self.failure(error))?;
+        if let (Some(trace), Some(path)) = (trace, self.trace) {
+            let file = trace
+                .finish()
+                .map_err(|error| OutputError::new(path, error))?;
+            file.commit()?;
+        }
+        if let Some(path) = self.report {
+            let page = of_estimate(
+                self.recording_path,
+                &result,
+                self.beside.as_ref(),
+                &self.command(),
+            );
+            write_file(path, page.to_html()?.as_bytes())?;
+        }
+        Ok(result)
+    }
+
+    fn failure(&self, error: EstimateError) -> Failure {
+        match (error, self.trace) {
+            (EstimateError::Trace(error), Some(path)) => OutputError::new(path, error).into(),
+            (error, _) => error.into(),
+        }
+    }
+
+    /// The command that makes the report again.
+    fn command(&self) -> String {
+        format!(
+            "muslip estimate --rig {} --range {} --estimator {} {}",
+            self.rig_path.display(),
+            crate::estimate::range_word(self.options.range),
+            self.options.estimator.word(),
+            self.recording_path.display()
+        )
+    }
+}
+
+/// The result below its headline.
+pub(super) fn tell(result: &EstimateResult, terminal: &mut Terminal) -> Result<(), Failure> {
+    let peak = &result.peak;
+    let skipped = match result.skipped.total() {
+        0 => "none skipped".to_owned(),
+        total => format!("{total} skipped ({})", result.skipped.in_words()),
+    };
+    terminal.table(&[
+        (
+            "peak friction",
+            format!(
+                "{:.5}  1-sigma {:.5}",
+                peak.peak_friction, peak.peak_friction_std
+            ),
+        ),
+        (
+            "critical slip",
+            format!(
+                "{:.5}  1-sigma {:.5}",
+                peak.critical_slip, peak.critical_slip_std
+            ),
+        ),
+        ("correlation", format!("{:.3}", peak.correlation)),
+        ("samples", format!("{} used, {skipped}", result.used)),
+    ])?;
+    terminal.line("")?;
+    terminal.paragraph(&consistency_sentence(
+        &result.consistency,
+        result.options.estimator,
+    ))?;
+    terminal.paragraph(&noise_sentence(&result.survey))
+}

@@ -1,0 +1,102 @@
+//! Standard output and standard error, for people and for pipes.
+
+use std::io::{self, IsTerminal, Write};
+
+use clap::builder::styling::Style;
+
+use super::Failure;
+
+/// Widest line of running text.
+const WIDEST_LINE: usize = 84;
+
+/// Standard output. Colours and bold only where it is a terminal and `NO_COLOR` does not forbid them.
+pub(super) struct Terminal {
+    out: anstream::AutoStream<io::Stdout>,
+}
+
+impl Terminal {
+    pub(super) fn new() -> Self {
+        Self {
+            out: anstream::AutoStream::auto(io::stdout()),
+        }
+    }
+
+    /// Prints a line as it is.
+    pub(super) fn line(&mut self, text: &str) -> Result<(), Failure> {
+        writeln!(self.out, "{text}").map_err(Failure::Terminal)
+    }
+
+    /// Prints the answer: a line in bold.
+    pub(super) fn headline(&mut self, text: &str) -> Result<(), Failure> {
+        let bold = Style::new().bold();
+        writeln!(self.out, "{bold}{text}{bold:#}").map_err(Failure::Terminal)
+    }
+
+    /// Prints running text, wrapped.
+    pub(super) fn paragraph(&mut self, text: &str) -> Result<(), Failure> {
+        for line in wrapped(text, WIDEST_LINE) {
+            self.line(&line)?;
+        }
+        Ok(())
+    }
+
+    /// Prints names and values in two columns.
+    pub(super) fn table(&mut self, rows: &[(&str, String)]) -> Result<(), Failure> {
+        let widest = rows.iter().map(|(name, _)| name.len()).max().unwrap_or(0);
+        for (name, value) in rows {
+            self.line(&format!("  {name:widest$}  {value}"))?;
+        }
+        Ok(())
+    }
+
+    /// Prints JSON and nothing else.
+    pub(super) fn json(&mut self, value: &serde_json::Value) -> Result<(), Failure> {
+        self.line(&format!("{value:#}"))
+    }
+
+    /// Prints bytes as they are.
+    pub(super) fn bytes(&mut self, bytes: &[u8]) -> Result<(), Failure> {
+        let mut out = io::stdout();
+        out.write_all(bytes)
+            .and_then(|()| out.flush())
+            .map_err(Failure::Terminal)
+    }
+}
+
+/// One line on standard error. That nobody may be there to read it is no reason to fail differently.
+pub(super) fn complain(line: &str) {
+    let _ = writeln!(anstream::stderr(), "{line}");
+}
+
+/// True where a progress bar would be seen and not be in the way.
+pub(super) fn shows_progress() -> bool {
+    io::stderr().is_terminal()
+}
+
+fn wrapped(text: &str, width: usize) -> Vec<String> {
+    let mut lines = vec![String::new()];
+    for word in text.split_whitespace() {
+        let Some(line) = lines.last_mut() else { break };
+        if !line.is_empty() && line.chars().count() + 1 + word.chars().count() > width {
+            lines.push(word.to_owned());
+        } else {
+            if !line.is_empty() {
+                line.push(' ');
+            }
+            line.push_str(word);
+        }
+    }
+    lines
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn text_is_wrapped_between_words() {
+        assert_eq!(wrapped("aa bb cc", 5), ["aa bb", "cc"]);
+        assert_eq!(wrapped("aaaaaaaa b", 5), ["aaaaaaaa", "b"]);
+        assert_eq!(wrapped("", 5), [""]);
+    }
+}

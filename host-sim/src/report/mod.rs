@@ -1,0 +1,16 @@
+//! Reports: figures described without a backend, drawn as SVG, on one self-contained HTML page.
+//!
+//! [`Figure`] says what is to be seen, [`svg`] draws it, [`Report`] puts text, tables and figures on a
+//! page that needs no network and runs no script. A job that wants a report builds these three; nothing
+//! here knows what a filter is, except [`of_estimate`].
+
+mod axis;
+mod estimate;
+mod figure;
+mod page;
+pub mod svg;
+
+pub use axis::{Axis, Extent, Scale};
+pub use estimate::{CurveLabel, of_estimate};
+pub use figure::{Figure, Ink, Layer, Shape, ellipse};
+pub use page::{Block, KeyFigure, Report, ReportError, Section, Tone};

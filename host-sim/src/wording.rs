@@ -1,0 +1,102 @@
+//! Results as an engineer would put them: the same sentences in the terminal and in reports.
+
+use muslip::filter::PeakEstimate;
+
+use crate::estimate::{Consistency, EstimatorKind, Verdict};
+use crate::measure::{FrictionNoise, Survey};
+
+/// Probability below which innovations are not believed to be white.
+const WHITE_FROM: f64 = 0.01;
+
+/// A value and its 1-sigma with as many decimals as the latter justifies.
+pub fn plus_minus(value: f64, std: f64) -> String {
+    let decimals = decimals_for(std);
+    format!("{value:.decimals$} \u{b1} {std:.decimals$}")
+}
+
+/// Decimals that show two digits of a 1-sigma figure, or one where the first of them is 4 or more.
+pub fn decimals_for(std: f64) -> usize {
+    if std.is_finite() && std > 0.0 {
+        (1.0 - (2.5 * std).log10().floor()).clamp(0.0, 6.0) as usize
+    } else {
+        4
+    }
+}
+
+/// The answer of an estimate or a fit.
+pub fn verdict_sentence(peak: &PeakEstimate<f64>) -> String {
+    let friction = plus_minus(peak.peak_friction, peak.peak_friction_std);
+    let slip = plus_minus(peak.critical_slip, peak.critical_slip_std);
+    if peak.peak_friction > 0.0 && peak.critical_slip > 0.0 {
+        format!("Friction peaks at {friction}, at a slip of {slip}.")
+    } else {
+        format!(
+            "No peak found: the estimate left the law's range (peak friction {friction}, critical slip {slip})."
+        )
+    }
+}
+
+/// What the consistency tests say and what follows from it.
+pub fn consistency_sentence(consistency: &Consistency, estimator: EstimatorKind) -> String {
+    let Consistency {
+        mean_nis,
+        nis_low,
+        nis_high,
+        whiteness_p,
+        verdict,
+    } = *consistency;
+    let meaning = match (verdict, estimator) {
+        (Verdict::Consistent, _) => "the 1-sigma figures are borne out by the innovations",
+        (Verdict::Conservative, EstimatorKind::Article) => {
+            "as always with the article's filter, which takes three times the measurement sigma and adds pseudonoise"
+        }
+        (Verdict::Overconfident, _) => {
+            "measurements lie further from the curve than their noise explains: another curve than the law's, or more noise than stated; do not trust the 1-sigma figures"
+        }
+    };
+    let colour = if whiteness_p >= WHITE_FROM {
+        format!("Innovations are white (p = {whiteness_p:.2}).")
+    } else {
+        "Innovations are correlated (p < 0.01): neighbouring samples share an error, such as a curve of another shape or filtered noise, which the 1-sigma figures do not include.".to_owned()
+    };
+    format!(
+        "{}: mean NIS {mean_nis:.3}, consistent from {nis_low:.3} to {nis_high:.3}; {meaning}. {colour}",
+        capitalised(verdict.word())
+    )
+}
+
+/// Where the noise of a measurement came from.
+pub fn noise_sentence(survey: &Survey) -> String {
+    let median = survey.median_normal_force_n;
+    match survey.noise {
+        FrictionNoise::Declared { drag_std_n } => format!(
+            "Friction noise {:.4} (1-sigma): {drag_std_n} N of drag, declared in the rig file, over a median normal force of {median:.0} N.",
+            drag_std_n / median
+        ),
+        FrictionNoise::Estimated { friction_std } => format!(
+            "Friction noise {friction_std:.4} (1-sigma), estimated from the scatter of the recording: the rig file declares none for drag_force_n."
+        ),
+    }
+}
+
+fn capitalised(word: &str) -> String {
+    let mut letters = word.chars();
+    letters
+        .next()
+        .map(|first| first.to_uppercase().chain(letters).collect())
+        .unwrap_or_default()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_uncertainty_decides_how_many_digits_are_shown() {
+        assert_eq!(plus_minus(0.338894, 0.0112), "0.339 \u{b1} 0.011");
+        assert_eq!(plus_minus(0.338894, 0.00093), "0.3389 \u{b1} 0.0009");
+        assert_eq!(plus_minus(1.0, 0.25), "1.00 \u{b1} 0.25");
+        assert_eq!(plus_minus(123.4, 25.0), "123 \u{b1} 25");
+        assert_eq!(plus_minus(0.5, 0.0), "0.5000 \u{b1} 0.0000");
+    }
+}
