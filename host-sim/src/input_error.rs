@@ -117,6 +117,12 @@ pub(crate) fn quoted(text: &str) -> String {
     }
 }
 
+/// A number in a message, short however large or small it is.
+pub(crate) fn shown(value: f64) -> String {
+    let text = format!("{value:?}");
+    text.strip_suffix(".0").map(str::to_owned).unwrap_or(text)
+}
+
 /// Replaces what would break or disguise a line of a terminal.
 pub(crate) fn one_line(text: &str) -> String {
     text.split(char::is_control)
@@ -149,6 +155,12 @@ mod tests {
         let text = error.to_string();
         assert_eq!(text.lines().count(), 1, "{text}");
         assert!(!text.contains('\u{1b}'), "{text:?}");
+    }
+
+    #[test]
+    fn numbers_are_shown_short() {
+        let shown = [0.0, 310.0, 0.25, 1e-308, -1e308, f64::NAN].map(shown);
+        assert_eq!(shown, ["0", "310", "0.25", "1e-308", "-1e308", "NaN"]);
     }
 
     #[test]

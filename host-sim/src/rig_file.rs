@@ -8,7 +8,7 @@ use std::path::Path;
 use serde::Deserialize;
 use toml::Spanned;
 
-use crate::input_error::{InputError, InputProblem, one_line, quoted, system_reason};
+use crate::input_error::{InputError, InputProblem, one_line, quoted, shown, system_reason};
 
 /// Smallest wheel radius that is taken for a wheel, in m.
 pub const SMALLEST_RADIUS_M: f64 = 0.005;
@@ -155,7 +155,7 @@ impl Written {
             }
             let problem = InputProblem::NotPositive {
                 key: one_line(key),
-                value: number.to_string(),
+                value: shown(number),
             };
             Err(fail(value.span().start, problem))
         };
@@ -163,7 +163,7 @@ impl Written {
         if !(SMALLEST_RADIUS_M..=LARGEST_RADIUS_M).contains(&radius_m) {
             return Err(fail(
                 self.wheel.radius_m.span().start,
-                InputProblem::RadiusOutOfRange(radius_m.to_string()),
+                InputProblem::RadiusOutOfRange(shown(radius_m)),
             ));
         }
         let law = &self.tyre.law;

@@ -48,8 +48,10 @@ pub(super) fn run(arguments: &Arguments, terminal: &mut Terminal) -> Result<(), 
     terminal.line("through the peak to a locked wheel. Its tyre follows a curve that the filter does not know.")?;
     terminal.line("")?;
     terminal.headline(&verdict_sentence(&result.peak))?;
-    terminal.line(&format!(
-        "True: {:.3}, at a slip of {:.3}.",
+    let away = (result.peak.peak_friction - truth.friction).abs() / result.peak.peak_friction_std;
+    terminal.paragraph(&format!(
+        "True: {:.3}, at a slip of {:.3}. That is {away:.0} sigma away, which is what a curve of another shape \
+         costs; the correlated innovations below give it away.",
         truth.friction, truth.slip_ratio
     ))?;
     terminal.line("")?;

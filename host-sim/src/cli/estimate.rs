@@ -40,7 +40,7 @@ pub(super) struct Arguments {
     #[arg(long, value_enum, default_value_t = EstimatorChoice::Article)]
     estimator: EstimatorChoice,
     /// Compensate the effects of a model that a diagnosis wrote.
-    #[arg(long, value_name = "MODEL.toml")]
+    #[arg(long, value_name = "MODEL.toml", hide = true)]
     model: Option<PathBuf>,
     /// Write the estimate after every sample: CSV, or JSON where the name ends in .json or .jsonl.
     #[arg(long, value_name = "TRACE.csv")]
@@ -78,6 +78,7 @@ enum EstimatorChoice {
     /// The article's extended Kalman filter.
     Article,
     /// Not part of this version.
+    #[value(hide = true)]
     Efficient,
 }
 

@@ -22,7 +22,7 @@ use crate::simulate::{RigLaw, RunError, Scenario};
 #[command(after_help = "Examples:\n  \
 muslip simulate --rig rig.toml --out run.csv\n  \
 muslip simulate --rig rig.toml --law burckhardt:wet-asphalt --seed 7 --out run.csv\n  \
-muslip simulate --rig rig.toml --law magic-formula:10,1.65,0.9,0.3 --speed 60 --rate-hz 1000 --out run.csv")]
+muslip simulate --rig rig.toml --law magic-formula:10,1.65,0.9,0.3 --speed 60 --out run.csv")]
 pub(super) struct Arguments {
     /// Rig file (TOML).
     #[arg(long, value_name = "RIG.toml")]
@@ -38,19 +38,29 @@ pub(super) struct Arguments {
     #[arg(long, default_value_t = 1)]
     seed: u64,
     /// Vehicle speed at the start in m/s [default: enough for the whole run].
-    #[arg(long, value_name = "M/S")]
+    #[arg(long, value_name = "M/S", allow_negative_numbers = true)]
     speed: Option<f64>,
     /// Normal force in N [default: the weight of the rig file's mass].
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", allow_negative_numbers = true)]
     normal_force: Option<f64>,
     /// Brake applications.
     #[arg(long, value_name = "N", default_value_t = 3)]
     applications: u32,
     /// Length of the run in s.
-    #[arg(long, value_name = "S", default_value_t = 4.0)]
+    #[arg(
+        long,
+        value_name = "S",
+        allow_negative_numbers = true,
+        default_value_t = 4.0
+    )]
     duration: f64,
     /// Rows a second.
-    #[arg(long, value_name = "HZ", default_value_t = 500.0)]
+    #[arg(
+        long,
+        value_name = "HZ",
+        allow_negative_numbers = true,
+        default_value_t = 500.0
+    )]
     rate_hz: f64,
 }
 

@@ -96,7 +96,7 @@ impl<W: Write> TraceWriter<W> {
         match self.format {
             TraceFormat::Csv => writeln!(
                 self.sink,
-                "{},{},{},{},{},{},{},{},{},{},{},{},{}",
+                "{:?},{:?},{:?},{:?},{:?},{:?},{:?},{:?},{:?},{:?},{:?},{:?},{:?}",
                 row.time_s,
                 row.slip,
                 row.friction,

@@ -138,6 +138,9 @@ pub fn fit_curve(
     if !sound_start {
         return Err(FitError::NonFinite);
     }
+    if frictions.iter().all(|&friction| friction == 0.0) {
+        return Err(FitError::Undetermined);
+    }
     let problem = Problem {
         slips,
         frictions,
@@ -194,8 +197,13 @@ fn covariance(
         return Err(FitError::NonFinite);
     }
     let determinant = j11 * j22 - j12 * j12;
-    // Beyond a correlation of 1 - 1e-12 the difference is rounding, not information.
-    let determined = determinant > 1e-12 * j11 * j22 && j11 > 0.0 && j22 > 0.0;
+    // Beyond a correlation of 1 - 1e-12 the difference is rounding, not information; so is an effect of
+    // sp that is a millionth of the friction's.
+    let by_log_slip = j22 * curve.critical_slip.powi(2);
+    let determined = determinant > 1e-12 * j11 * j22
+        && by_log_slip > 1e-12 * j11 * curve.peak_friction.powi(2)
+        && j11 > 0.0
+        && j22 > 0.0;
     if !determined {
         return Err(FitError::Undetermined);
     }

@@ -10,7 +10,7 @@ use muslip::sample::RigSample;
 use super::header::{Channel, Header, Required};
 use super::position::{Place, line_and_column};
 use super::utf8::{NotUtf8At, Utf8Reader};
-use crate::input_error::{InputError, InputProblem, quoted, system_reason};
+use crate::input_error::{InputError, InputProblem, quoted, shown, system_reason};
 
 const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
 
@@ -152,7 +152,11 @@ impl Recording {
     }
 
     fn read_failure(&self, error: csv::Error) -> InputError {
-        let error = io::Error::from(error);
+        let error = match error.into_kind() {
+            csv::ErrorKind::Io(error) => error,
+            // Nothing else is asked of the CSV reader here.
+            other => io::Error::other(format!("{other:?}")),
+        };
         match error
             .get_ref()
             .and_then(|inner| inner.downcast_ref::<NotUtf8At>())
@@ -242,11 +246,11 @@ impl Rows<'_> {
         let before = self.last_time_s;
         if now <= before {
             let problem = if now == before {
-                InputProblem::TimeRepeats(now.to_string())
+                InputProblem::TimeRepeats(shown(now))
             } else {
                 InputProblem::TimeGoesBack {
-                    before: before.to_string(),
-                    now: now.to_string(),
+                    before: shown(before),
+                    now: shown(now),
                 }
             };
             let cell = self.header.index(Channel::Time).unwrap_or_default();

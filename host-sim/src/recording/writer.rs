@@ -62,7 +62,12 @@ fn push_nine_digits(text: &mut String, value: f64) {
     // Rounded through the decimal form, so that the digits printed are those of the rounded number.
     let rounded = format!("{value:.8e}").parse().unwrap_or(value);
     // Writing to a String cannot fail. Adding 0 turns -0 into 0.
-    let _ = write!(text, "{}", rounded + 0.0);
+    let rounded: f64 = rounded + 0.0;
+    let _ = if rounded == 0.0 || (1e-9..1e15).contains(&rounded.abs()) {
+        write!(text, "{rounded}")
+    } else {
+        write!(text, "{rounded:e}")
+    };
 }
 
 #[cfg(test)]
@@ -74,12 +79,12 @@ mod tests {
         let mut writer =
             RecordingWriter::new(Vec::new(), &["a\nb".into()], &["x", "y", "z"]).unwrap();
         writer.row(&[1.0 / 3.0, f64::NAN, -0.0]).unwrap();
-        writer.row(&[12_345_678_901.0, 1e-7, 100.0]).unwrap();
+        writer.row(&[12_345_678_901.0, 1e-7, -1e300]).unwrap();
         assert!(writer.row(&[1.0]).is_err());
         let text = String::from_utf8(writer.into_inner()).unwrap();
         assert_eq!(
             text,
-            "# a b\nx,y,z\n0.333333333,,0\n12345678900,0.0000001,100\n"
+            "# a b\nx,y,z\n0.333333333,,0\n12345678900,0.0000001,-1e300\n"
         );
     }
 }

@@ -1,0 +1,6 @@
+//! The `muslip` command, built for the tests of this package.
+#![forbid(unsafe_code)]
+
+fn main() -> std::process::ExitCode {
+    host_sim::cli::main()
+}
