@@ -60,19 +60,16 @@ impl OutputFile {
     /// [`OutputError`] if the folder does not exist or may not be written.
     pub fn create(path: &Path) -> Result<Self, OutputError> {
         let fail = |error| OutputError::new(path, error);
-        // Through a link, the file that it points at is replaced, not the link.
-        let destination = fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
-        let sink = match fs::metadata(&destination) {
+        let sink = match fs::metadata(path) {
             Ok(metadata) if metadata.is_dir() => {
                 return Err(fail(io::Error::from(io::ErrorKind::IsADirectory)));
             }
             Ok(metadata) if !metadata.is_file() => Sink::Direct(BufWriter::new(
-                File::options()
-                    .write(true)
-                    .open(&destination)
-                    .map_err(fail)?,
+                File::options().write(true).open(path).map_err(fail)?,
             )),
             _ => {
+                // Through a link, the file that it points at is replaced, not the link.
+                let destination = fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
                 let folder = match destination.parent() {
                     Some(folder) if !folder.as_os_str().is_empty() => folder,
                     _ => Path::new("."),

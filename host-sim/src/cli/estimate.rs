@@ -1,5 +1,6 @@
 //! `muslip estimate`.
 
+use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
@@ -17,6 +18,9 @@ use crate::recording::Recording;
 use crate::report::{CurveLabel, of_estimate};
 use crate::rig_file::RigFile;
 use crate::wording::{consistency_sentence, noise_sentence, verdict_sentence};
+
+/// The name that stands for standard output.
+const PRINTED: &str = "-";
 
 /// Estimate peak friction and the slip of the peak from one recording, sample by sample.
 ///
@@ -42,7 +46,8 @@ pub(super) struct Arguments {
     /// Compensate the effects of a model that a diagnosis wrote.
     #[arg(long, value_name = "MODEL.toml", hide = true)]
     model: Option<PathBuf>,
-    /// Write the estimate after every sample: CSV, or JSON where the name ends in .json or .jsonl.
+    /// Write the estimate after every sample: CSV, or JSON where the name ends in .json or .jsonl; `-`
+    /// prints it as CSV in place of the words.
     #[arg(long, value_name = "TRACE.csv")]
     trace: Option<PathBuf>,
     /// Write a report with plots.
@@ -97,6 +102,12 @@ pub(super) fn run(arguments: &Arguments, terminal: &mut Terminal) -> Result<(), 
                 .into(),
         ));
     }
+    let trace_is_printed = arguments.trace.as_deref() == Some(Path::new(PRINTED));
+    if trace_is_printed && arguments.json {
+        return Err(Failure::Usage(
+            "--trace - and --json would both print: give one of them a file".into(),
+        ));
+    }
     let job = Job {
         rig_path: &arguments.rig,
         recording_path: &arguments.recording,
@@ -109,6 +120,9 @@ pub(super) fn run(arguments: &Arguments, terminal: &mut Terminal) -> Result<(), 
         beside: None,
     };
     let result = job.run()?;
+    if trace_is_printed {
+        return Ok(());
+    }
     if arguments.json {
         return terminal.json(&result.to_json());
     }
@@ -146,9 +160,8 @@ impl Job<'_> {
         drop(report);
         let mut trace = match self.trace {
             Some(path) => {
-                let file = OutputFile::create(path)?;
-                let writer = TraceWriter::new(file, TraceFormat::of(path));
-                Some(writer.map_err(|error| OutputError::new(path, error))?)
+                let writer = TraceWriter::new(TraceSink::create(path)?, TraceFormat::of(path));
+                Some(writer.map_err(|error| trace_failure(path, error))?)
             }
             None => None,
         };
@@ -161,10 +174,8 @@ impl Job<'_> {
         )
         .map_err(|error| self.failure(error))?;
         if let (Some(trace), Some(path)) = (trace, self.trace) {
-            let file = trace
-                .finish()
-                .map_err(|error| OutputError::new(path, error))?;
-            file.commit()?;
+            let sink = trace.finish().map_err(|error| trace_failure(path, error))?;
+            sink.commit()?;
         }
         if let Some(path) = self.report {
             let page = of_estimate(
@@ -180,7 +191,7 @@ impl Job<'_> {
 
     fn failure(&self, error: EstimateError) -> Failure {
         match (error, self.trace) {
-            (EstimateError::Trace(error), Some(path)) => OutputError::new(path, error).into(),
+            (EstimateError::Trace(error), Some(path)) => trace_failure(path, error),
             (error, _) => error.into(),
         }
     }
@@ -194,6 +205,52 @@ impl Job<'_> {
             self.options.estimator.word(),
             self.recording_path.display()
         )
+    }
+}
+
+/// Where a trace goes.
+enum TraceSink {
+    File(OutputFile),
+    Printed(BufWriter<io::Stdout>),
+}
+
+impl TraceSink {
+    fn create(path: &Path) -> Result<Self, OutputError> {
+        if path == Path::new(PRINTED) {
+            return Ok(Self::Printed(BufWriter::new(io::stdout())));
+        }
+        OutputFile::create(path).map(Self::File)
+    }
+
+    fn commit(self) -> Result<(), Failure> {
+        match self {
+            Self::File(file) => Ok(file.commit()?),
+            Self::Printed(mut out) => out.flush().map_err(Failure::Terminal),
+        }
+    }
+}
+
+impl Write for TraceSink {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        match self {
+            Self::File(file) => file.write(bytes),
+            Self::Printed(out) => out.write(bytes),
+        }
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        match self {
+            Self::File(file) => file.flush(),
+            Self::Printed(out) => out.flush(),
+        }
+    }
+}
+
+fn trace_failure(path: &Path, error: io::Error) -> Failure {
+    if path == Path::new(PRINTED) {
+        Failure::Terminal(error)
+    } else {
+        OutputError::new(path, error).into()
     }
 }
 

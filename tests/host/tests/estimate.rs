@@ -155,6 +155,19 @@ fn the_article_s_filter_is_conservative_at_about_a_tenth() {
 }
 
 #[test]
+fn a_printed_trace_is_the_written_one_and_nothing_else() {
+    let scratch = article_scratch(7);
+    estimate(&scratch, &["--trace", "t.csv"]);
+    let printed = scratch.output(&["estimate", "--rig", "rig.toml", "--trace", "-", "run.csv"]);
+    assert_eq!(printed, scratch.read("t.csv"));
+    let both = [
+        "estimate", "--rig", "rig.toml", "--trace", "-", "--json", "run.csv",
+    ];
+    assert!(scratch.complaint(&both).contains("both print"));
+    assert_eq!(scratch.files(), ["rig.toml", "run.csv", "t.csv"]);
+}
+
+#[test]
 fn the_json_traces_hold_the_csv_s_numbers() {
     let scratch = article_scratch(3);
     for name in ["t.csv", "t.json", "t.jsonl"] {
