@@ -2,7 +2,7 @@
 
 use muslip::filter::PeakEstimate;
 
-use crate::estimate::{Consistency, EstimatorKind, Verdict};
+use crate::estimate::{Consistency, EstimateResult, EstimatorKind, Verdict};
 use crate::measure::{FrictionNoise, Survey};
 
 /// Probability below which innovations are not believed to be white.
@@ -33,6 +33,17 @@ pub fn verdict_sentence(peak: &PeakEstimate<f64>) -> String {
         format!(
             "No peak found: the estimate left the law's range (peak friction {friction}, critical slip {slip})."
         )
+    }
+}
+
+/// The answer of an estimate, with a word of warning where its uncertainty is not borne out.
+pub fn estimate_sentence(result: &EstimateResult) -> String {
+    let sentence = verdict_sentence(&result.peak);
+    match result.consistency.verdict {
+        Verdict::Overconfident => {
+            format!("{sentence} The measurements do not bear this uncertainty out.")
+        }
+        Verdict::Consistent | Verdict::Conservative => sentence,
     }
 }
 

@@ -11,7 +11,7 @@ use super::terminal::Terminal;
 use crate::demo;
 use crate::estimate::{EstimateOptions, EstimatorKind};
 use crate::output::{create_folder, write_file};
-use crate::wording::verdict_sentence;
+use crate::wording::estimate_sentence;
 
 /// Show the main job on a bundled recording: print the estimate, write a report with plots.
 #[derive(Debug, Args)]
@@ -47,7 +47,7 @@ pub(super) fn run(arguments: &Arguments, terminal: &mut Terminal) -> Result<(), 
     )?;
     terminal.line("through the peak to a locked wheel. Its tyre follows a curve that the filter does not know.")?;
     terminal.line("")?;
-    terminal.headline(&verdict_sentence(&result.peak))?;
+    terminal.headline(&estimate_sentence(&result))?;
     let away = (result.peak.peak_friction - truth.friction).abs() / result.peak.peak_friction_std;
     terminal.paragraph(&format!(
         "True: {:.3}, at a slip of {:.3}. That is {away:.0} sigma away, which is what a curve of another shape \

@@ -17,7 +17,7 @@ use crate::output::{OutputError, OutputFile, write_file};
 use crate::recording::Recording;
 use crate::report::{CurveLabel, of_estimate};
 use crate::rig_file::RigFile;
-use crate::wording::{consistency_sentence, noise_sentence, verdict_sentence};
+use crate::wording::{consistency_sentence, estimate_sentence, noise_sentence};
 
 /// The name that stands for standard output.
 const PRINTED: &str = "-";
@@ -129,7 +129,7 @@ pub(super) fn run(arguments: &Arguments, terminal: &mut Terminal) -> Result<(), 
     terminal.headline(&format!(
         "{}: {}",
         arguments.recording.display(),
-        verdict_sentence(&result.peak)
+        estimate_sentence(&result)
     ))?;
     terminal.line("")?;
     tell(&result, terminal)?;

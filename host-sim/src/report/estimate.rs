@@ -7,7 +7,7 @@ use super::figure::{Figure, Ink, Shape, ellipse};
 use super::page::{Block, KeyFigure, Report, Section, Tone};
 use crate::estimate::{EstimateResult, Verdict, range_word};
 use crate::fit::Curve;
-use crate::wording::{consistency_sentence, noise_sentence, plus_minus, verdict_sentence};
+use crate::wording::{consistency_sentence, estimate_sentence, noise_sentence, plus_minus};
 
 /// A curve to draw beside the estimate, under its name in the legend.
 #[derive(Debug, Clone, PartialEq)]
@@ -51,7 +51,7 @@ pub fn of_estimate(
             result.options.estimator.word(),
             range_word(result.options.range)
         ),
-        verdict: verdict_sentence(peak),
+        verdict: estimate_sentence(result),
         tone,
         key_figures: vec![
             KeyFigure {

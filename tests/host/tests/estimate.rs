@@ -356,6 +356,25 @@ fn a_curve_of_another_shape_shows_in_the_innovations() {
 }
 
 #[test]
+fn an_uncertainty_that_is_not_borne_out_is_told_with_the_answer() {
+    let scratch = Scratch::with_rig(&format!("{RIG}\n[noise]\ndrag_force_n = 4.0\n"));
+    // Ten times the declared noise.
+    scratch.write("run.csv", recording_of(article::measurements(1)));
+    assert_eq!(
+        estimate(&scratch, &[])["consistency"]["verdict"],
+        "overconfident"
+    );
+    let words = scratch.output(&["estimate", "--rig", "rig.toml", "run.csv"]);
+    assert!(
+        words
+            .lines()
+            .next()
+            .unwrap()
+            .ends_with("do not bear this uncertainty out.")
+    );
+}
+
+#[test]
 fn measured_recordings_give_curves_of_a_tyre() {
     let Some(folder) = measured_data("dart-friction") else {
         return;
