@@ -5,9 +5,11 @@
 //! here knows what a filter is, except [`of_estimate`].
 
 mod axis;
+mod clip;
 mod estimate;
 mod figure;
 mod page;
+mod shade;
 pub mod svg;
 
 pub use axis::{Axis, Extent, Scale};

@@ -9,7 +9,9 @@ use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
 use super::axis::ticks;
-use super::figure::{Figure, Ink, Layer, Shape};
+use super::clip::pieces_inside;
+use super::figure::{Figure, Layer, Shape};
+use super::shade::{FRAME, GRID, PAPER, SHADES, TEXT, ink};
 
 /// Canvas units for each unit of the figure.
 const FINENESS: i32 = 4;
@@ -97,55 +99,6 @@ pub fn stand_alone(figure: &Figure) -> Result<String, DrawError> {
     }
     let head = "xmlns=\"http://www.w3.org/2000/svg\" width=\"760\" style=\"background:#fff\"";
     Ok(with_head(&svg, head, figure))
-}
-
-/// One colour: its placeholder in the drawing, its CSS variable, its shade on white.
-struct Shade {
-    code: u8,
-    variable: &'static str,
-    on_white: &'static str,
-}
-
-impl Shade {
-    const fn new(code: u8, variable: &'static str, on_white: &'static str) -> Self {
-        Self {
-            code,
-            variable,
-            on_white,
-        }
-    }
-
-    fn placeholder(&self) -> String {
-        format!("#FE{:02X}FE", self.code)
-    }
-
-    fn color(&self) -> RGBColor {
-        RGBColor(0xfe, self.code, 0xfe)
-    }
-}
-
-const TEXT: Shade = Shade::new(1, "muted", "#5c6370");
-const GRID: Shade = Shade::new(2, "grid", "#e4e6ea");
-const FRAME: Shade = Shade::new(3, "frame", "#9aa0aa");
-const MEASURED: Shade = Shade::new(4, "measured", "#3f6fa3");
-const ESTIMATE: Shade = Shade::new(5, "estimate", "#c8472b");
-const SECOND: Shade = Shade::new(6, "second", "#7a4fa3");
-const TRUTH: Shade = Shade::new(7, "truth", "#1d7f5f");
-const REFERENCE: Shade = Shade::new(8, "reference", "#8a8f98");
-const PAPER: Shade = Shade::new(9, "paper", "#ffffff");
-const SHADES: [Shade; 9] = [
-    TEXT, GRID, FRAME, MEASURED, ESTIMATE, SECOND, TRUTH, REFERENCE, PAPER,
-];
-
-fn ink(ink: Ink) -> RGBColor {
-    match ink {
-        Ink::Measured => MEASURED,
-        Ink::Estimate => ESTIMATE,
-        Ink::Second => SECOND,
-        Ink::Truth => TRUTH,
-        Ink::Reference => REFERENCE,
-    }
-    .color()
 }
 
 /// Replaces the opening tag, so that the figure scales with its surroundings and has a name for those
@@ -450,61 +403,6 @@ fn draw_layer(
     Ok(())
 }
 
-/// The pieces of a line that lie within the frame, as positions.
-fn pieces_inside(
-    figure: &Figure,
-    points: &[(f64, f64)],
-    along: (f64, f64),
-    up: (f64, f64),
-) -> Vec<Vec<(f64, f64)>> {
-    let mut pieces: Vec<Vec<(f64, f64)>> = Vec::new();
-    let mut before = None;
-    for point in points {
-        let now = figure.x.position(point.0).zip(figure.y.position(point.1));
-        if let (Some(from), Some(to)) = (before, now)
-            && let Some((start, end)) = clipped(from, to, along, up)
-        {
-            match pieces.last_mut() {
-                Some(piece) if piece.last() == Some(&start) => piece.push(end),
-                _ => pieces.push(vec![start, end]),
-            }
-        }
-        before = now;
-    }
-    pieces
-}
-
-type Point = (f64, f64);
-
-/// The part of a straight line within a frame (Y.-D. Liang and B. A. Barsky, ACM Trans. Graphics 3
-/// (1984) 1-22).
-fn clipped(from: Point, to: Point, along: Point, up: Point) -> Option<(Point, Point)> {
-    let (dx, dy) = (to.0 - from.0, to.1 - from.1);
-    let (mut enter, mut leave) = (0.0_f64, 1.0_f64);
-    for (slope, room) in [
-        (-dx, from.0 - along.0),
-        (dx, along.1 - from.0),
-        (-dy, from.1 - up.0),
-        (dy, up.1 - from.1),
-    ] {
-        if slope == 0.0 {
-            if room < 0.0 {
-                return None;
-            }
-        } else if slope < 0.0 {
-            enter = enter.max(room / slope);
-        } else {
-            leave = leave.min(room / slope);
-        }
-    }
-    let at = |share: f64| match share {
-        0.0 => from,
-        1.0 => to,
-        _ => (from.0 + share * dx, from.1 + share * dy),
-    };
-    (enter <= leave).then(|| (at(enter), at(leave)))
-}
-
 fn draw_marker(
     chart: &mut Chart<'_, '_>,
     at: (f64, f64),
@@ -550,7 +448,7 @@ fn dashes(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::report::{Axis, Extent, ellipse};
+    use crate::report::{Axis, Extent, Ink, ellipse};
 
     fn figure(points: Vec<(f64, f64)>) -> Figure {
         let level = Shape::Level(0.5);
@@ -614,16 +512,6 @@ mod tests {
             let svg = for_page(&figure(points), Size::Narrow).unwrap();
             assert!(!svg.contains("NaN") && !svg.contains("inf"));
         }
-    }
-
-    #[test]
-    fn a_line_is_cut_at_the_frame() {
-        let cut = |from, to| clipped(from, to, (0.0, 1.0), (0.0, 1.0));
-        assert_eq!(cut((-1.0, 0.5), (2.0, 0.5)), Some(((0.0, 0.5), (1.0, 0.5))));
-        assert_eq!(cut((0.2, 0.2), (0.4, 0.4)), Some(((0.2, 0.2), (0.4, 0.4))));
-        assert_eq!(cut((0.5, 0.5), (0.5, 2.5)), Some(((0.5, 0.5), (0.5, 1.0))));
-        assert_eq!(cut((-1.0, 0.5), (0.5, 2.0)), None);
-        assert_eq!(cut((2.0, 0.0), (2.0, 1.0)), None);
     }
 
     #[test]
