@@ -3,6 +3,7 @@
 
 pub mod cli;
 pub mod demo;
+pub mod diagnose;
 pub mod estimate;
 pub mod fit;
 pub mod input_error;

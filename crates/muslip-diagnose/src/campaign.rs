@@ -1,0 +1,65 @@
+//! What the engine is given: the rig as its file describes it, and the recorded runs.
+
+use std::collections::BTreeMap;
+
+use serde::{Deserialize, Serialize};
+
+/// The rig and the base simulation's starting values, as declared by the user.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Rig {
+    /// Free-rolling radius in m: slip = (v − radius·ω)/v.
+    pub radius_m: f64,
+    /// Polar inertia of the wheel in kg m².
+    pub wheel_inertia_kg_m2: f64,
+    /// Translating mass in kg that the braked tyre slows.
+    pub mass_kg: f64,
+    /// Whether only the tyre's drag slows the vehicle, so that m dv/dt = −drag is expected.
+    pub coasting: bool,
+    /// Brake torque per pressure in N m/Pa, where declared.
+    pub torque_per_pressure_nm_pa: Option<f64>,
+    /// Starting value of the peak friction.
+    pub peak_friction: f64,
+    /// Starting value of the slip at the peak.
+    pub critical_slip: f64,
+    /// Whether the law's two parameters must stay at their starting values.
+    pub law_fixed: bool,
+    /// Declared 1-sigma noise by column name: a hint, possibly wrong.
+    pub declared_noise: BTreeMap<String, f64>,
+}
+
+/// One recording. A missing value is `NaN`; all columns have the length of `time_s`.
+#[derive(Clone, Debug, Default)]
+pub struct Run {
+    /// Name shown in the results (the file's path as given).
+    pub name: String,
+    /// Time in s, strictly increasing.
+    pub time_s: Vec<f64>,
+    /// Wheel speed in rad/s.
+    pub wheel_speed_rad_s: Vec<f64>,
+    /// Vehicle speed in m/s.
+    pub vehicle_speed_m_s: Vec<f64>,
+    /// Drag in N; empty when only a prediction is wanted.
+    pub drag_force_n: Vec<f64>,
+    /// Normal force in N.
+    pub normal_force_n: Vec<f64>,
+    /// Measured brake torque in N m, where recorded.
+    pub brake_torque_nm: Option<Vec<f64>>,
+    /// Brake pressure in Pa, where recorded.
+    pub brake_pressure_pa: Option<Vec<f64>>,
+    /// Every other numeric column: a candidate to explain a mismatch.
+    pub extra: Vec<(String, Vec<f64>)>,
+}
+
+impl Run {
+    /// Number of samples.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.time_s.len()
+    }
+
+    /// Whether the run has no samples.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.time_s.is_empty()
+    }
+}

@@ -1,0 +1,397 @@
+//! Which mechanisms: every one alone, then small sets by a beam search, never greedily by one.
+//!
+//! A set is judged by its loss on whitened innovations plus a price for its parameters; one more
+//! mechanism is admitted only if it buys more than chance, more than a tolerance below which nobody
+//! could care, and more than the misfit that the form of those already named may leave.
+
+use rayon::prelude::*;
+
+use crate::fit::{Fitted, Joint};
+use crate::mechanism::{Balance, Evidence, Id, Stage};
+use crate::model::{Model, Term};
+use crate::omnibus::Levers;
+
+/// Thresholds of the search.
+#[derive(Clone, Copy, Debug)]
+pub struct Limits {
+    /// Smallest effect worth naming, as a share of the noise's standard deviation (root mean square).
+    pub tolerance: f64,
+    /// Smallest gain in nats, whatever the number of samples.
+    pub least_gain: f64,
+    /// Share of what has been explained that the form of a mechanism may leave unexplained.
+    pub form_misfit: f64,
+    /// Largest number of mechanisms in one balance.
+    pub most: usize,
+    /// Models kept at each size.
+    pub beam: usize,
+}
+
+impl Default for Limits {
+    fn default() -> Self {
+        Self {
+            tolerance: 0.12,
+            least_gain: 14.0,
+            form_misfit: 0.03,
+            most: 4,
+            beam: 4,
+        }
+    }
+}
+
+impl Limits {
+    /// The same for wheel and vehicle: an innovation there is mostly noise of a differenced speed, so the same
+    /// effect is a smaller share of it.
+    #[must_use]
+    pub fn for_dynamics(&self) -> Self {
+        Self {
+            tolerance: 0.4 * self.tolerance,
+            ..*self
+        }
+    }
+}
+
+/// A fitted model with its price.
+#[derive(Clone, Debug)]
+pub struct Candidate {
+    /// The fit.
+    pub fitted: Fitted,
+    /// Loss plus price in nats.
+    pub criterion: f64,
+    /// Mechanisms in it, sorted.
+    pub ids: Vec<Id>,
+}
+
+/// What a search leaves.
+pub struct Search {
+    /// The base model alone.
+    pub base: Candidate,
+    /// Best model of each set of mechanisms that was tried, by criterion.
+    pub tried: Vec<Candidate>,
+    /// The chosen one.
+    pub chosen: Candidate,
+    /// Number of innovations.
+    pub count: usize,
+}
+
+/// Price of a model's mechanisms in nats.
+#[must_use]
+pub fn price(model: &Model, count: usize) -> f64 {
+    let parameters: usize = model.terms.iter().map(|t| t.parameters.len()).sum();
+    // Each parameter costs half the log of the sample size (Schwarz 1978); each mechanism the choice
+    // among the catalogue.
+    0.5 * parameters as f64 * (count.max(2) as f64).ln() + 3.5 * model.terms.len() as f64
+}
+
+/// Gain in nats that the next mechanism must bring to a set that has gained `explained` already.
+#[must_use]
+pub fn required(limits: &Limits, count: usize, explained: f64) -> f64 {
+    let tolerance = 0.5 * limits.tolerance * limits.tolerance * count as f64;
+    limits
+        .least_gain
+        .max(tolerance)
+        .max(limits.form_misfit * explained)
+}
+
+/// Whether an entry can show in these balances (force gain acts on wheel and vehicle alike).
+#[must_use]
+pub fn belongs(joint: &Joint<'_>, entry: usize) -> bool {
+    let mechanism = joint.data().catalogue.get(entry);
+    joint.parts.iter().any(|part| match part.balance {
+        Balance::Tyre => mechanism.stage() <= Stage::Chain,
+        Balance::Wheel => mechanism.stage() == Stage::Wheel || mechanism.id() == Id::ForceGain,
+        Balance::Vehicle => mechanism.stage() == Stage::Vehicle,
+    })
+}
+
+/// What a model leaves over, for mechanisms that look where to start.
+#[must_use]
+pub fn evidence(joint: &Joint<'_>, model: &Model) -> Vec<Evidence> {
+    let data = joint.data();
+    let problem = &joint.parts[0];
+    if !joint.is_tyre() {
+        return vec![Evidence::default(); data.series.len()];
+    }
+    let levers = Levers::new(data, model);
+    (0..data.series.len())
+        .map(|run| {
+            let n = data.series[run].len();
+            let mut weight = vec![0.0; n];
+            if problem.runs.contains(&run) {
+                for segment in problem.segments(run) {
+                    for k in segment.clone() {
+                        weight[k] = problem.noise.scale[run][k].powi(-2);
+                    }
+                }
+            }
+            let predicted = levers.reading[run].clone();
+            let residual = predicted
+                .iter()
+                .zip(data.series[run].drag.iter().chain(core::iter::repeat(&0.0)))
+                .map(|(f, y)| y - f)
+                .collect();
+            Evidence {
+                predicted,
+                residual,
+                weight,
+            }
+        })
+        .collect()
+}
+
+/// Starts of every entry, best first once they have been judged.
+type Starts = Vec<Vec<Vec<f64>>>;
+
+/// A model with one more mechanism, its predicted loss, and its starts in order of promise.
+type Extended = (Model, f64, Vec<Vec<f64>>);
+
+/// Starts kept for later rounds.
+const KEPT_STARTS: usize = 3;
+
+/// A model with one more mechanism, at the start from which one step is predicted to gain most, with
+/// the loss predicted there; and all starts in that order.
+fn extended(
+    joint: &Joint<'_>,
+    model: &Model,
+    entry: usize,
+    starts: &[Vec<f64>],
+) -> Option<Extended> {
+    let mut judged: Vec<(f64, Model, Vec<f64>, Vec<f64>)> = starts
+        .iter()
+        .filter_map(|start| {
+            let mut trial = model.clone();
+            trial.terms.push(Term {
+                entry,
+                parameters: start.clone(),
+            });
+            let (predicted, moved) = joint.outlook(&trial);
+            predicted
+                .is_finite()
+                .then_some((predicted, trial, moved, start.clone()))
+        })
+        .collect();
+    judged.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let order = judged.iter().map(|j| j.3.clone()).collect();
+    let (predicted, trial, moved, _) = judged.into_iter().next()?;
+    // Where the predicted step would not hold, the fit starts without it and falls back on damping.
+    let stepped = trial.with(&moved);
+    let from = if joint.loss(&stepped) < joint.loss(&trial) {
+        stepped
+    } else {
+        trial
+    };
+    Some((from, predicted, order))
+}
+
+/// A fit with its price.
+fn priced(joint: &Joint<'_>, fitted: Fitted) -> Candidate {
+    Candidate {
+        criterion: fitted.loss + price(&fitted.model, joint.count()),
+        ids: fitted.model.ids(&joint.data().catalogue),
+        fitted,
+    }
+}
+
+/// Keeps the best of each set of mechanisms, sorted by criterion.
+fn keep_best(candidates: Vec<Candidate>) -> Vec<Candidate> {
+    let mut kept: Vec<Candidate> = Vec::new();
+    for candidate in candidates {
+        match kept.iter_mut().find(|c| c.ids == candidate.ids) {
+            Some(known) => {
+                if candidate.criterion < known.criterion {
+                    *known = candidate;
+                }
+            }
+            None => kept.push(candidate),
+        }
+    }
+    kept.sort_by(|a, b| a.criterion.total_cmp(&b.criterion));
+    kept
+}
+
+/// Models with one more mechanism than those given, fitted; best first. `starts` is reordered and
+/// shortened as starts are judged.
+fn extend(
+    joint: &Joint<'_>,
+    beam: &[Candidate],
+    starts: &mut Starts,
+    least_promise: f64,
+) -> Vec<Candidate> {
+    let data = joint.data();
+    let count = joint.count();
+    let first = beam.iter().all(|c| c.ids.is_empty());
+    let mut jobs: Vec<(usize, usize)> = Vec::new();
+    let evidences: Vec<Vec<Evidence>> = beam
+        .iter()
+        .map(|c| evidence(joint, &c.fitted.model))
+        .collect();
+    for (place, candidate) in beam.iter().enumerate() {
+        for entry in 0..data.catalogue.entries().len() {
+            if belongs(joint, entry) && !candidate.ids.contains(&data.catalogue.get(entry).id()) {
+                jobs.push((place, entry));
+            }
+        }
+    }
+    let known: &Starts = starts;
+    let judged: Vec<Option<Extended>> = jobs
+        .par_iter()
+        .map(|&(place, entry)| {
+            let own = &known[entry];
+            let looked;
+            // A patch is looked for in what the model at hand leaves over.
+            let from = if own.is_empty() || data.catalogue.get(entry).id() == Id::SurfacePatch {
+                looked = data.catalogue.get(entry).starts(
+                    &data.context,
+                    &data.series,
+                    &evidences[place],
+                );
+                &looked
+            } else {
+                own
+            };
+            let (model, predicted, order) =
+                extended(joint, &beam[place].fitted.model, entry, from)?;
+            Some((model, predicted, order))
+        })
+        .collect();
+    let mut promising: Vec<(Model, f64)> = Vec::new();
+    for ((place, entry), found) in jobs.iter().zip(judged) {
+        let Some((model, predicted, mut order)) = found else {
+            continue;
+        };
+        if first {
+            order.truncate(KEPT_STARTS);
+            starts[*entry] = order;
+        }
+        let promised = predicted + price(&model, count);
+        if first || beam[*place].criterion - promised >= least_promise {
+            promising.push((model, promised));
+        }
+    }
+    promising.sort_by(|a, b| a.1.total_cmp(&b.1));
+    if !first {
+        // A step promises too much or too little where the effect is strong; several are fitted.
+        promising.truncate(5 * beam.len().max(1));
+    }
+    let fits: Vec<Candidate> = promising
+        .par_iter()
+        .map(|(model, _)| priced(joint, joint.fit(model, 15)))
+        .collect();
+    keep_best(fits)
+}
+
+/// Members of a level that are close enough to its best to be led further.
+fn beam_of(level: &[Candidate], explained: f64, limits: &Limits) -> Vec<Candidate> {
+    let reach = 40.0 + 0.5 * explained;
+    level
+        .iter()
+        .filter(|c| c.criterion - level[0].criterion <= reach)
+        .take(limits.beam)
+        .cloned()
+        .collect()
+}
+
+/// Names the mechanisms of one balance, or of wheel and vehicle together.
+#[must_use]
+pub fn search(joint: &Joint<'_>, base: Fitted, limits: &Limits) -> Search {
+    let count = joint.count();
+    let base = priced(joint, base);
+    let mut starts: Starts = vec![Vec::new(); joint.data().catalogue.entries().len()];
+    let mut tried: Vec<Candidate> = Vec::new();
+    let mut chosen = base.clone();
+    let mut beam = vec![base.clone()];
+    for _ in 0..limits.most {
+        let explained = base.criterion - chosen.criterion;
+        let needed = required(limits, count, explained);
+        let level = extend(joint, &beam, &mut starts, 0.4 * needed);
+        let Some(best) = level.first().cloned() else {
+            break;
+        };
+        tried.extend(level.iter().cloned());
+        if chosen.criterion - best.criterion < needed {
+            break;
+        }
+        chosen = best;
+        beam = beam_of(&level, base.criterion - chosen.criterion, limits);
+    }
+    tried = keep_best(tried);
+    Search {
+        base,
+        tried,
+        chosen,
+        count,
+    }
+}
+
+/// The same search judged again under other noise: every set tried is fitted anew from where it stood, and
+/// one more mechanism is looked for.
+#[must_use]
+pub fn refine(joint: &Joint<'_>, search: &Search, limits: &Limits) -> Search {
+    let count = joint.count();
+    let size = search.chosen.ids.len();
+    let base = priced(joint, joint.fit(&search.base.fitted.model, 15));
+    // Sets of the chosen size that were near, and the chosen set's own subsets.
+    let reach = 60.0 + 0.35 * (search.base.criterion - search.chosen.criterion);
+    let again: Vec<&Candidate> = search
+        .tried
+        .iter()
+        .filter(|c| {
+            (c.ids.len() == size && c.criterion - search.chosen.criterion <= reach)
+                || (c.ids.len() < size && c.ids.iter().all(|id| search.chosen.ids.contains(id)))
+        })
+        .take(16)
+        .collect();
+    let mut tried: Vec<Candidate> = again
+        .par_iter()
+        .map(|c| priced(joint, joint.fit(&c.fitted.model, 15)))
+        .collect();
+    tried = keep_best(tried);
+    let mut chosen = tried
+        .iter()
+        .find(|c| c.ids.len() == size)
+        .cloned()
+        .unwrap_or_else(|| base.clone());
+    // Fewer, where the last one no longer buys enough.
+    loop {
+        let without: Option<Candidate> = tried
+            .iter()
+            .filter(|c| {
+                c.ids.len() + 1 == chosen.ids.len()
+                    && c.ids.iter().all(|id| chosen.ids.contains(id))
+            })
+            .min_by(|a, b| a.criterion.total_cmp(&b.criterion))
+            .cloned()
+            .or_else(|| (chosen.ids.len() == 1).then(|| base.clone()));
+        match without {
+            Some(fewer)
+                if fewer.criterion - chosen.criterion
+                    < required(limits, count, base.criterion - fewer.criterion) =>
+            {
+                chosen = fewer
+            }
+            _ => break,
+        }
+    }
+    // One more, where the sharper noise shows it.
+    if chosen.ids.len() == size && size < limits.most {
+        let mut starts: Starts = vec![Vec::new(); joint.data().catalogue.entries().len()];
+        let needed = required(limits, count, base.criterion - chosen.criterion);
+        let level = extend(
+            joint,
+            core::slice::from_ref(&chosen),
+            &mut starts,
+            0.4 * needed,
+        );
+        if let Some(best) = level.first()
+            && chosen.criterion - best.criterion >= needed
+        {
+            chosen = best.clone();
+        }
+        tried.extend(level);
+    }
+    Search {
+        base,
+        tried: keep_best(tried),
+        chosen,
+        count,
+    }
+}

@@ -1,0 +1,203 @@
+//! The prepared campaign: all runs, what they have in common, and the catalogue in the numbers needed.
+
+use crate::campaign::{Rig, Run};
+use crate::mechanism::{Before, Context, Mechanism, catalogue};
+use crate::number::{Dual, Number};
+use crate::prepare::{DataFault, Series, prepare};
+use crate::smooth::median_in_place;
+
+/// Width of the dual numbers: parameters differentiated in one pass.
+pub const WIDTH: usize = 6;
+
+/// The catalogue in plain and in dual numbers, in the same order.
+pub struct Catalogue {
+    plain: Vec<Box<dyn Mechanism<f64>>>,
+    dual: Vec<Box<dyn Mechanism<Dual<WIDTH>>>>,
+}
+
+impl Default for Catalogue {
+    fn default() -> Self {
+        Self {
+            plain: catalogue(),
+            dual: catalogue(),
+        }
+    }
+}
+
+impl Catalogue {
+    /// All entries in plain numbers.
+    #[must_use]
+    pub fn entries(&self) -> &[Box<dyn Mechanism<f64>>] {
+        &self.plain
+    }
+    /// One entry in plain numbers.
+    #[must_use]
+    pub fn get(&self, index: usize) -> &dyn Mechanism<f64> {
+        self.plain[index].as_ref()
+    }
+}
+
+/// Numbers for which the catalogue is at hand.
+pub trait Listed: Number {
+    /// The entry in these numbers.
+    fn entry(catalogue: &Catalogue, index: usize) -> &dyn Mechanism<Self>;
+}
+
+impl Listed for f64 {
+    fn entry(catalogue: &Catalogue, index: usize) -> &dyn Mechanism<Self> {
+        catalogue.plain[index].as_ref()
+    }
+}
+
+impl Listed for Dual<WIDTH> {
+    fn entry(catalogue: &Catalogue, index: usize) -> &dyn Mechanism<Self> {
+        catalogue.dual[index].as_ref()
+    }
+}
+
+/// A campaign ready to be analysed.
+pub struct Data {
+    /// The rig as declared.
+    pub rig: Rig,
+    /// Runs in the order given.
+    pub series: Vec<Series>,
+    /// What they have in common.
+    pub context: Context,
+    /// Names of the other columns.
+    pub extra_names: Vec<String>,
+    /// What was wrong with the recordings.
+    pub faults: Vec<DataFault>,
+    /// All mechanisms.
+    pub catalogue: Catalogue,
+}
+
+/// Mean over samples that pass a filter; `fallback` if there are none.
+fn mean(values: impl Iterator<Item = f64>, fallback: f64) -> f64 {
+    let (mut sum, mut count) = (0.0, 0.0);
+    for v in values.filter(|v| v.is_finite()) {
+        sum += v;
+        count += 1.0;
+    }
+    if count > 0.0 { sum / count } else { fallback }
+}
+
+impl Data {
+    /// Prepares all runs of a campaign.
+    #[must_use]
+    pub fn new(rig: &Rig, runs: &[Run]) -> Self {
+        let mut extra_names: Vec<String> = Vec::new();
+        for run in runs {
+            for (column, _) in &run.extra {
+                if !extra_names.contains(column) {
+                    extra_names.push(column.clone());
+                }
+            }
+        }
+        let mut series = Vec::with_capacity(runs.len());
+        let mut faults = Vec::new();
+        for (index, run) in runs.iter().enumerate() {
+            let (prepared, found) = prepare(rig, run, &extra_names, index);
+            series.push(prepared);
+            faults.extend(found);
+        }
+        let context = Self::context_of(rig, &series);
+        Self {
+            rig: rig.clone(),
+            series,
+            context,
+            extra_names,
+            faults,
+            catalogue: Catalogue::default(),
+        }
+    }
+
+    fn context_of(rig: &Rig, series: &[Series]) -> Context {
+        let rolling = |f: fn(&Series, usize) -> f64| {
+            series
+                .iter()
+                .flat_map(move |s| (0..s.len()).filter(|&k| s.rolling[k]).map(move |k| f(s, k)))
+        };
+        let finite_max = |values: &mut dyn Iterator<Item = f64>| {
+            values.filter(|v| v.is_finite()).fold(0.0, f64::max)
+        };
+        let mut drags: Vec<f64> = series
+            .iter()
+            .flat_map(|s| s.drag_smooth.iter().copied())
+            .filter(|d| d.is_finite())
+            .collect();
+        let max_drag = if drags.is_empty() {
+            1.0
+        } else {
+            let at = (drags.len() - 1).min(drags.len() * 999 / 1000);
+            *drags.select_nth_unstable_by(at, f64::total_cmp).1
+        };
+        let mut steps: Vec<f64> = series.iter().map(|s| s.typical_dt).collect();
+        let mut sigmas: Vec<f64> = series
+            .iter()
+            .map(|s| s.drag_sigma)
+            .filter(|s| *s > 0.0)
+            .collect();
+        let span = |s: &Series| match (s.time.first(), s.time.last()) {
+            (Some(a), Some(b)) => b - a,
+            _ => 0.0,
+        };
+        let mut context = Context {
+            radius: rig.radius_m,
+            inertia: rig.wheel_inertia_kg_m2,
+            mass: rig.mass_kg,
+            nominal: [rig.peak_friction, rig.critical_slip],
+            mean_load: mean(rolling(|s, k| s.load.smooth[k]), 1.0).max(1e-9),
+            mean_speed: mean(rolling(|s, k| s.speed.smooth[k]), 1.0).max(1e-3),
+            max_speed: finite_max(&mut rolling(|s, k| s.speed.smooth[k])).max(1e-3),
+            mean_wheel_speed: mean(rolling(|s, k| s.wheel.smooth[k].abs()), 1.0).max(1e-3),
+            dt: if steps.is_empty() {
+                1.0
+            } else {
+                median_in_place(&mut steps)
+            },
+            duration: series.iter().map(span).fold(0.0, f64::max).max(1e-3),
+            total_time: series.iter().map(span).sum::<f64>().max(1e-3),
+            runs: series.len(),
+            distance: series
+                .iter()
+                .filter_map(|s| s.distance.last().copied())
+                .fold(0.0, f64::max),
+            clock_continues: series.windows(2).all(|w| {
+                match (w[0].time.last(), w[1].time.first()) {
+                    (Some(a), Some(b)) => b > a,
+                    _ => false,
+                }
+            }) && series.len() > 1,
+            first_time: series
+                .first()
+                .and_then(|s| s.time.first().copied())
+                .unwrap_or(0.0),
+            drag_sigma: if sigmas.is_empty() {
+                0.0
+            } else {
+                median_in_place(&mut sigmas)
+            },
+            max_drag: max_drag.abs().max(1e-9),
+            ..Context::default()
+        };
+        let mut before = Before::default();
+        let mut power = 0.0;
+        let mut brake = 0.0;
+        for s in series {
+            context.before.push(before);
+            for k in 0..s.len() {
+                before.work += s.nominal_power(k, &context) * s.dt[k];
+                if let Some(t) = &s.torque {
+                    let p = t.smooth[k] * s.wheel.smooth[k] * s.dt[k];
+                    brake += if p.is_finite() { p.max(0.0) } else { 0.0 };
+                }
+            }
+            before.time += span(s);
+        }
+        power += before.work;
+        context.total_work = before.work;
+        context.mean_power = power / context.total_time;
+        context.mean_brake_power = brake / context.total_time;
+        context
+    }
+}

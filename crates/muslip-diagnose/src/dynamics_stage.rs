@@ -1,0 +1,212 @@
+//! The wheel and vehicle balances, diagnosed together: a wrong drag scale breaks both.
+
+use crate::choose::{Limits, Search, refine, search};
+use crate::data::Data;
+use crate::fit::{BalanceNoise, Fitted, Joint, Problem};
+use crate::mechanism::Balance;
+use crate::model::Model;
+use crate::saturated;
+use crate::split::Split;
+
+/// What wheel and vehicle say.
+pub struct DynamicsStage {
+    /// Noise of each balance under the final model.
+    pub noise: Vec<(Balance, BalanceNoise)>,
+    /// All sets tried and the one chosen.
+    pub search: Search,
+}
+
+/// Shortest balance that is looked at, in innovations.
+const LEAST: usize = 60;
+
+fn part<'a>(
+    data: &'a Data,
+    split: &'a Split,
+    balance: Balance,
+    noise: &'a BalanceNoise,
+    chain: Option<&'a [Vec<f64>]>,
+) -> Problem<'a> {
+    Problem {
+        data,
+        balance,
+        noise,
+        runs: &split.fit_runs,
+        segments: split.fit.of(balance),
+        chain,
+    }
+}
+
+/// Balances that the recordings allow.
+fn available(data: &Data, split: &Split) -> Vec<Balance> {
+    [Balance::Wheel, Balance::Vehicle]
+        .into_iter()
+        .filter(|b| {
+            let count: usize = split
+                .fit_runs
+                .iter()
+                .flat_map(|r| &split.fit.of(*b)[*r])
+                .map(|s| s.len())
+                .sum();
+            count >= LEAST && (*b != Balance::Vehicle || data.rig.coasting)
+        })
+        .collect()
+}
+
+fn noises(
+    data: &Data,
+    split: &Split,
+    model: &Model,
+    chain: Option<&[Vec<f64>]>,
+) -> Vec<(Balance, BalanceNoise)> {
+    available(data, split)
+        .into_iter()
+        .map(|balance| {
+            let guess = saturated::first_guess(data, balance);
+            let problem = part(data, split, balance, &guess, chain);
+            let fitted = Fitted {
+                model: model.clone(),
+                loss: 0.0,
+                information: nalgebra::DMatrix::zeros(0, 0),
+            };
+            (balance, saturated::estimate(&problem, &fitted))
+        })
+        .collect()
+}
+
+/// Analyses wheel and vehicle; `None` where neither can be formed.
+#[must_use]
+pub fn analyse(
+    data: &Data,
+    split: &Split,
+    limits: &Limits,
+    chain: Option<&[Vec<f64>]>,
+) -> Option<DynamicsStage> {
+    let model = Model::default();
+    let noise = noises(data, split, &model, chain);
+    if noise.is_empty() {
+        return None;
+    }
+    let joint = Joint {
+        parts: noise
+            .iter()
+            .map(|(b, n)| part(data, split, *b, n, chain))
+            .collect(),
+    };
+    let base = joint.fit(&model, 1);
+    let mut found = search(&joint, base, limits);
+    if found.chosen.ids.is_empty() {
+        return Some(DynamicsStage {
+            noise,
+            search: found,
+        });
+    }
+    let sharper_noise = noises(data, split, &found.chosen.fitted.model, chain);
+    let sharper = Joint {
+        parts: sharper_noise
+            .iter()
+            .map(|(b, n)| part(data, split, *b, n, chain))
+            .collect(),
+    };
+    found = refine(&sharper, &found, limits);
+    Some(DynamicsStage {
+        noise: sharper_noise,
+        search: found,
+    })
+}
+
+/// What wheel and vehicle say of a fault in the drag channel: a force that the cell reports late breaks
+/// them too, a force that the tyre builds up late does not.
+pub struct CrossEvidence<'a> {
+    data: &'a Data,
+    split: &'a Split,
+    limits: Limits,
+    noise: Vec<(Balance, BalanceNoise)>,
+}
+
+/// Weight of the cross evidence: these balances have noise models of their own to be wrong.
+const CROSS_WEIGHT: f64 = 0.5;
+/// Price in nats of each further mechanism that a set of tyre mechanisms calls for in wheel and vehicle.
+const EXTRA_MECHANISM: f64 = 40.0;
+/// Sets of tyre mechanisms that are compared by it.
+const COMPARED: usize = 4;
+
+impl<'a> CrossEvidence<'a> {
+    /// Prepares the balances; `None` where there are none. `chain` is the best guess so far.
+    #[must_use]
+    pub fn new(
+        data: &'a Data,
+        split: &'a Split,
+        limits: &Limits,
+        chain: Option<&[Vec<f64>]>,
+    ) -> Option<Self> {
+        let noise = noises(data, split, &Model::default(), chain);
+        (!noise.is_empty()).then(|| Self {
+            data,
+            split,
+            limits: limits.for_dynamics(),
+            noise,
+        })
+    }
+
+    /// Least loss and price of both balances with this chain taken off the drag, whatever mechanisms of their
+    /// own they then need.
+    fn criterion(&self, chain: Option<&[Vec<f64>]>) -> f64 {
+        // One fault in the channel against two or three elsewhere that happen to look like it.
+        let joint = Joint {
+            parts: self
+                .noise
+                .iter()
+                .map(|(b, n)| part(self.data, self.split, *b, n, chain))
+                .collect(),
+        };
+        let base = joint.fit(&Model::default(), 1);
+        let chosen = search(&joint, base, &self.limits).chosen;
+        CROSS_WEIGHT * chosen.criterion + EXTRA_MECHANISM * chosen.ids.len() as f64
+    }
+
+    /// Adds what the other balances say to the best sets of the chosen size, and chooses again.
+    #[must_use]
+    pub fn rerank(&self, mut found: Search) -> Search {
+        let size = found.chosen.ids.len();
+        let reach = 60.0 + 0.5 * (found.base.criterion - found.chosen.criterion);
+        let best = found.chosen.criterion;
+        let compared: Vec<usize> = (0..found.tried.len())
+            .filter(|i| {
+                found.tried[*i].ids.len() == size && found.tried[*i].criterion - best <= reach
+            })
+            .take(COMPARED)
+            .collect();
+        let chains: Vec<Option<Vec<Vec<f64>>>> = compared
+            .iter()
+            .map(|i| crate::tyre_stage::chain(self.data, &found.tried[*i].fitted.model))
+            .collect();
+        if size == 0 || compared.len() < 2 || chains.iter().all(Option::is_none) {
+            return found;
+        }
+        let without = self.criterion(None);
+        let mut worst = f64::NEG_INFINITY;
+        for (i, chain) in compared.iter().zip(&chains) {
+            let change = match chain {
+                Some(chain) => self.criterion(Some(chain)) - without,
+                None => 0.0,
+            };
+            if change.is_finite() {
+                found.tried[*i].criterion += change;
+                worst = worst.max(change);
+            }
+        }
+        // Sets that were not compared must not win by having been spared.
+        for (i, candidate) in found.tried.iter_mut().enumerate() {
+            if candidate.ids.len() == size && !compared.contains(&i) {
+                candidate.criterion += worst.max(0.0);
+            }
+        }
+        found
+            .tried
+            .sort_by(|a, b| a.criterion.total_cmp(&b.criterion));
+        if let Some(top) = found.tried.iter().find(|c| c.ids.len() == size) {
+            found.chosen = top.clone();
+        }
+        found
+    }
+}

@@ -1,0 +1,107 @@
+//! Torque per pressure falls with brake temperature.
+
+use super::{Context, Describe, Evidence, Id, Law, Mechanism, Parameter, Reported, Stage, State};
+use crate::number::Number;
+use crate::prepare::Series;
+
+/// Brake temperature in units of the mean brake power times a second, from cold at the start of a run.
+fn heat<T: Number>(time_constant: T, series: &Series, context: &Context) -> Vec<T> {
+    let Some(torque) = &series.torque else {
+        return Vec::new();
+    };
+    let rate = T::constant(1.0) / time_constant;
+    let mut theta = T::constant(0.0);
+    let scale = context.mean_brake_power.max(1e-9);
+    (0..series.len())
+        .map(|k| {
+            let power = (torque.smooth[k] * series.wheel.smooth[k] / scale).max(0.0);
+            let power = if power.is_finite() { power } else { 0.0 };
+            // Exact for constant power over the step.
+            let stay = (-(rate * series.dt[k])).exp();
+            let settled = time_constant * power;
+            theta = (theta - settled) * stay + settled;
+            theta
+        })
+        .collect()
+}
+
+/// Torque per pressure falls with brake temperature.
+pub struct BrakeFade;
+
+impl Describe for BrakeFade {
+    fn id(&self) -> Id {
+        Id::BrakeFade
+    }
+    fn stage(&self) -> Stage {
+        Stage::Wheel
+    }
+    fn parameters(&self, context: &Context) -> Vec<Parameter> {
+        vec![
+            Parameter::new("sensitivity", "1/s", -2.0, 5.0),
+            Parameter::new(
+                "time_constant",
+                "s",
+                0.3,
+                (20.0 * context.duration).max(10.0),
+            ),
+        ]
+    }
+    fn starts(
+        &self,
+        context: &Context,
+        _series: &[Series],
+        _evidence: &[Evidence],
+    ) -> Vec<Vec<f64>> {
+        [0.5, 2.0, 8.0, 40.0]
+            .iter()
+            .filter(|t| **t < 20.0 * context.duration)
+            .map(|t| vec![0.0, *t])
+            .collect()
+    }
+    fn equation(&self) -> &'static str {
+        "T = torque_per_pressure * pressure * exp(-sensitivity * theta), d(theta)/dt = power/mean_power - theta/time_constant"
+    }
+    fn statement(&self, reported: &[Reported<f64>], _p: &[f64]) -> String {
+        format!(
+            "brake torque per pressure falls by up to {:.1} % as the brake heats",
+            100.0 * reported[0].value
+        )
+    }
+}
+
+impl<T: Number> Mechanism<T> for BrakeFade {
+    fn apply(&self, p: &[T], series: &Series, context: &Context, state: &mut State<T>) {
+        for (torque, theta) in state.brake.iter_mut().zip(heat(p[1], series, context)) {
+            *torque = *torque * (-(p[0] * theta)).exp();
+        }
+    }
+    fn report(
+        &self,
+        p: &[T],
+        _law: &Law<T>,
+        context: &Context,
+        series: &[Series],
+    ) -> Vec<Reported<T>> {
+        let mut largest = T::constant(0.0);
+        for run in series {
+            for theta in heat(p[1], run, context) {
+                if theta.value() > largest.value() {
+                    largest = theta;
+                }
+            }
+        }
+        let loss = -((-(p[0] * largest)).exp()) + 1.0;
+        vec![
+            Reported {
+                name: "torque_loss",
+                unit: "1",
+                value: loss,
+            },
+            Reported {
+                name: "time_constant",
+                unit: "s",
+                value: p[1],
+            },
+        ]
+    }
+}

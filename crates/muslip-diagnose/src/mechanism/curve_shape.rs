@@ -1,0 +1,95 @@
+//! The sharpness of the peak or the friction of the full skid is not that of the two-parameter law.
+
+use super::{Context, Describe, Evidence, Id, Law, Mechanism, Parameter, Reported, Stage, State};
+use crate::number::Number;
+use crate::prepare::Series;
+
+/// Forms of the curve.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Form {
+    /// Another b on either side of the peak.
+    TwoSided,
+    /// And a stretched falling side.
+    Stretched,
+}
+
+/// All forms.
+pub const FORMS: [Form; 2] = [Form::TwoSided, Form::Stretched];
+
+/// The sharpness of the peak or the friction of the full skid is not that of the two-parameter law.
+pub struct CurveShape {
+    /// Which form.
+    pub form: Form,
+}
+
+impl Describe for CurveShape {
+    fn id(&self) -> Id {
+        Id::CurveShape
+    }
+    fn form(&self) -> &'static str {
+        match self.form {
+            Form::TwoSided => "two_sided",
+            Form::Stretched => "stretched",
+        }
+    }
+    fn stage(&self) -> Stage {
+        Stage::Law
+    }
+    fn parameters(&self, _context: &Context) -> Vec<Parameter> {
+        let mut all = vec![
+            Parameter::new("rising_shape", "1", -1.2, 3.0),
+            Parameter::new("falling_shape", "1", -2.0, 6.0),
+        ];
+        if self.form == Form::Stretched {
+            all.push(Parameter::new("falling_stretch", "1", -1.2, 1.2));
+        }
+        all
+    }
+    fn starts(
+        &self,
+        _context: &Context,
+        _series: &[Series],
+        _evidence: &[Evidence],
+    ) -> Vec<Vec<f64>> {
+        let mut starts = vec![vec![0.0, 0.0], vec![0.3, 1.0], vec![0.0, 2.0]];
+        if self.form == Form::Stretched {
+            for s in &mut starts {
+                s.push(0.0);
+            }
+        }
+        starts
+    }
+    fn equation(&self) -> &'static str {
+        "mu = peak (2 + b) x / (1 + b x + x^2), x = (slip/critical_slip)^p, b and p of their own on the falling side"
+    }
+    fn statement(&self, reported: &[Reported<f64>], _p: &[f64]) -> String {
+        format!(
+            "the curve has another shape: at full skid {:.2} of the peak friction is left",
+            reported[0].value
+        )
+    }
+}
+
+impl<T: Number> Mechanism<T> for CurveShape {
+    fn apply(&self, p: &[T], _series: &Series, _context: &Context, state: &mut State<T>) {
+        state.law.rise = Some(p[0]);
+        state.law.fall = Some((p[1], p.get(2).copied()));
+    }
+    fn report(
+        &self,
+        p: &[T],
+        law: &Law<T>,
+        _context: &Context,
+        _series: &[Series],
+    ) -> Vec<Reported<T>> {
+        let mut shaped = *law;
+        shaped.rise = Some(p[0]);
+        shaped.fall = Some((p[1], p.get(2).copied()));
+        let full = shaped.shape(T::constant(1.0) / law.critical);
+        vec![Reported {
+            name: "full_skid_ratio",
+            unit: "1",
+            value: full,
+        }]
+    }
+}

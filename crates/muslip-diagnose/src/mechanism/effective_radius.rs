@@ -1,0 +1,112 @@
+//! The rolling radius is not the rig file's (constant, or changing with load or speed), so slip is biased.
+
+use super::{Context, Describe, Evidence, Id, Law, Mechanism, Parameter, Reported, Stage, State};
+use crate::number::Number;
+use crate::prepare::Series;
+
+/// What the radius depends on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Form {
+    /// Nothing: it is just another.
+    Constant,
+    /// Normal force.
+    Load,
+    /// Speed squared.
+    Speed,
+}
+
+/// All forms.
+pub const FORMS: [Form; 3] = [Form::Constant, Form::Load, Form::Speed];
+
+/// The rolling radius is not the rig file's (constant, or changing with load or speed), so slip is biased.
+pub struct EffectiveRadius {
+    /// Which form.
+    pub form: Form,
+}
+
+impl Describe for EffectiveRadius {
+    fn id(&self) -> Id {
+        Id::EffectiveRadius
+    }
+    fn form(&self) -> &'static str {
+        match self.form {
+            Form::Constant => "constant",
+            Form::Load => "with_load",
+            Form::Speed => "with_speed",
+        }
+    }
+    fn stage(&self) -> Stage {
+        Stage::Kinematics
+    }
+    fn parameters(&self, _context: &Context) -> Vec<Parameter> {
+        let mut all = vec![Parameter::new("radius_error", "1", -0.1, 0.1)];
+        match self.form {
+            Form::Constant => {}
+            Form::Load => all.push(Parameter::new("per_relative_load", "1", -0.15, 0.15)),
+            Form::Speed => all.push(Parameter::new("per_relative_speed_squared", "1", -0.1, 0.1)),
+        }
+        all
+    }
+    fn starts(
+        &self,
+        _context: &Context,
+        _series: &[Series],
+        _evidence: &[Evidence],
+    ) -> Vec<Vec<f64>> {
+        vec![vec![0.0; if self.form == Form::Constant { 1 } else { 2 }]]
+    }
+    fn equation(&self) -> &'static str {
+        match self.form {
+            Form::Constant => "slip = (v - radius * omega)/v",
+            Form::Load => "slip = (v - radius * (1 + a (normal_force/mean - 1)) * omega)/v",
+            Form::Speed => "slip = (v - radius * (1 + a ((v/mean v)^2 - 1)) * omega)/v",
+        }
+    }
+    fn statement(&self, reported: &[Reported<f64>], p: &[f64]) -> String {
+        format!(
+            "the wheel rolls on a radius of {:.5} m{}",
+            reported[0].value,
+            match self.form {
+                Form::Constant => String::new(),
+                Form::Load => format!(", changing by {:.2} % when the load doubles", 100.0 * p[1]),
+                Form::Speed => format!(
+                    ", growing by {:.2} % from rest to the mean speed",
+                    100.0 * p[1]
+                ),
+            }
+        )
+    }
+}
+
+impl<T: Number> Mechanism<T> for EffectiveRadius {
+    fn apply(&self, p: &[T], series: &Series, context: &Context, state: &mut State<T>) {
+        let n = state.omega.len();
+        let mut radius = Vec::with_capacity(n);
+        for k in 0..n {
+            let mut change = p[0] + 1.0;
+            match self.form {
+                Form::Constant => {}
+                Form::Load => change += p[1] * (series.load.smooth[k] / context.mean_load - 1.0),
+                Form::Speed => {
+                    let relative = series.speed.smooth[k] / context.mean_speed;
+                    change += p[1] * (relative * relative - 1.0);
+                }
+            }
+            radius.push(change * context.radius);
+        }
+        state.radius = Some(radius);
+    }
+    fn report(
+        &self,
+        p: &[T],
+        _law: &Law<T>,
+        context: &Context,
+        _series: &[Series],
+    ) -> Vec<Reported<T>> {
+        vec![Reported {
+            name: "radius",
+            unit: "m",
+            value: (p[0] + 1.0) * context.radius,
+        }]
+    }
+}

@@ -1,0 +1,83 @@
+//! Peak friction changes with normal force.
+
+use super::{Context, Describe, Evidence, Id, Law, Mechanism, Parameter, Reported, Stage, State};
+use crate::number::Number;
+use crate::prepare::Series;
+
+/// Peak friction changes with normal force.
+pub struct LoadSensitivity {
+    /// Whether the slip at the peak changes with load too.
+    pub with_stiffness: bool,
+}
+
+impl Describe for LoadSensitivity {
+    fn id(&self) -> Id {
+        Id::LoadSensitivity
+    }
+    fn form(&self) -> &'static str {
+        if self.with_stiffness {
+            "peak_and_critical_slip"
+        } else {
+            "peak"
+        }
+    }
+    fn stage(&self) -> Stage {
+        Stage::Law
+    }
+    fn parameters(&self, _context: &Context) -> Vec<Parameter> {
+        let mut all = vec![Parameter::new("load_sensitivity", "1", -1.5, 1.5)];
+        if self.with_stiffness {
+            all.push(Parameter::new("critical_slip_exponent", "1", -2.0, 2.0));
+        }
+        all
+    }
+    fn starts(
+        &self,
+        _context: &Context,
+        _series: &[Series],
+        _evidence: &[Evidence],
+    ) -> Vec<Vec<f64>> {
+        vec![vec![0.0; if self.with_stiffness { 2 } else { 1 }]]
+    }
+    fn equation(&self) -> &'static str {
+        "peak_friction = peak_friction0 * (normal_force/mean)^(-load_sensitivity)"
+    }
+    fn statement(&self, reported: &[Reported<f64>], _p: &[f64]) -> String {
+        format!(
+            "peak friction falls by {:.2} % for each 10 % more normal force",
+            10.0 * reported[0].value
+        )
+    }
+}
+
+impl<T: Number> Mechanism<T> for LoadSensitivity {
+    fn apply(&self, p: &[T], _series: &Series, context: &Context, state: &mut State<T>) {
+        let n = state.load.len();
+        let mut factor = Vec::with_capacity(n);
+        let mut critical = Vec::new();
+        for k in 0..n {
+            let log_load = (state.load[k].abs() / context.mean_load + 1e-3).ln();
+            factor.push((-(p[0] * log_load)).exp());
+            if self.with_stiffness {
+                critical.push((p[1] * log_load).exp());
+            }
+        }
+        state.scale_friction(&factor);
+        if self.with_stiffness {
+            state.scale_critical(&critical);
+        }
+    }
+    fn report(
+        &self,
+        p: &[T],
+        _law: &Law<T>,
+        _context: &Context,
+        _series: &[Series],
+    ) -> Vec<Reported<T>> {
+        vec![Reported {
+            name: "load_sensitivity",
+            unit: "1",
+            value: p[0],
+        }]
+    }
+}

@@ -1,0 +1,102 @@
+//! Force builds up over a rolling distance (lag time = length / speed).
+
+use super::filters::first_order;
+use super::{Context, Describe, Evidence, Id, Law, Mechanism, Parameter, Reported, Stage, State};
+use crate::number::Number;
+use crate::prepare::Series;
+
+/// What is delayed by rolling.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Form {
+    /// The slip that the tyre feels.
+    Slip,
+    /// The force.
+    Force,
+}
+
+/// All forms.
+pub const FORMS: [Form; 2] = [Form::Slip, Form::Force];
+
+/// Force builds up over a rolling distance (lag time = length / speed).
+pub struct RelaxationLength {
+    /// Which form.
+    pub form: Form,
+}
+
+impl Describe for RelaxationLength {
+    fn id(&self) -> Id {
+        Id::RelaxationLength
+    }
+    fn form(&self) -> &'static str {
+        match self.form {
+            Form::Slip => "slip",
+            Form::Force => "force",
+        }
+    }
+    fn stage(&self) -> Stage {
+        match self.form {
+            Form::Slip => Stage::Slip,
+            Form::Force => Stage::Contact,
+        }
+    }
+    fn parameters(&self, context: &Context) -> Vec<Parameter> {
+        vec![Parameter::new(
+            "length",
+            "m",
+            1e-5,
+            (8.0 * context.radius).max(0.05),
+        )]
+    }
+    fn starts(
+        &self,
+        context: &Context,
+        _series: &[Series],
+        _evidence: &[Evidence],
+    ) -> Vec<Vec<f64>> {
+        [0.08, 0.25, 0.7, 1.5, 3.0]
+            .iter()
+            .map(|m| vec![m * context.radius])
+            .collect()
+    }
+    fn equation(&self) -> &'static str {
+        match self.form {
+            Form::Slip => {
+                "drag = normal_force * mu(slip'), length * d(slip')/dt = v * (slip - slip')"
+            }
+            Form::Force => "length * d(drag)/dt = v * (normal_force * mu(slip) - drag)",
+        }
+    }
+    fn statement(&self, reported: &[Reported<f64>], _p: &[f64]) -> String {
+        format!("force builds up over {:.3} m of rolling", reported[0].value)
+    }
+}
+
+impl<T: Number> Mechanism<T> for RelaxationLength {
+    fn apply(&self, p: &[T], series: &Series, _context: &Context, state: &mut State<T>) {
+        let speed: Vec<f64> = series
+            .speed
+            .smooth
+            .iter()
+            .map(|v| v.abs().max(0.05))
+            .collect();
+        let rate = T::constant(1.0) / p[0];
+        let step = |k: usize| rate * (series.dt[k] * 0.5 * (speed[k] + speed[k - 1]));
+        match self.form {
+            Form::Slip => first_order(&mut state.slip, step),
+            Form::Force => first_order(&mut state.force, step),
+        }
+    }
+    fn report(
+        &self,
+        p: &[T],
+        _law: &Law<T>,
+        _context: &Context,
+        _series: &[Series],
+    ) -> Vec<Reported<T>> {
+        vec![Reported {
+            name: "length",
+            unit: "m",
+            value: p[0],
+        }]
+    }
+}

@@ -1,0 +1,69 @@
+//! Rising slip and falling slip follow different curves, whatever the rate.
+
+use super::{Context, Describe, Evidence, Id, Law, Mechanism, Parameter, Reported, Stage, State};
+use crate::number::Number;
+use crate::prepare::Series;
+
+/// Rising slip and falling slip follow different curves, whatever the rate.
+pub struct SlipHysteresis;
+
+impl Describe for SlipHysteresis {
+    fn id(&self) -> Id {
+        Id::SlipHysteresis
+    }
+    fn stage(&self) -> Stage {
+        Stage::Friction
+    }
+    fn parameters(&self, _context: &Context) -> Vec<Parameter> {
+        vec![
+            Parameter::new("loop_share", "1", -0.6, 0.6),
+            Parameter::new("width", "1", 0.001, 0.15),
+        ]
+    }
+    fn starts(
+        &self,
+        _context: &Context,
+        _series: &[Series],
+        _evidence: &[Evidence],
+    ) -> Vec<Vec<f64>> {
+        [0.003, 0.012, 0.04].iter().map(|w| vec![0.0, *w]).collect()
+    }
+    fn equation(&self) -> &'static str {
+        "friction = mu(slip) * (1 + loop_share * z), dz/d(slip) = (sign(d slip) - z)/width * sign(d slip)"
+    }
+    fn statement(&self, reported: &[Reported<f64>], _p: &[f64]) -> String {
+        format!(
+            "friction follows a loop: rising and falling slip differ by {:.1} % either side of their mean, whatever the rate",
+            100.0 * reported[0].value
+        )
+    }
+}
+
+impl<T: Number> Mechanism<T> for SlipHysteresis {
+    fn apply(&self, p: &[T], series: &Series, _context: &Context, state: &mut State<T>) {
+        let mut z = T::constant(0.0);
+        for k in 1..state.slip.len() {
+            if !series.rolling[k] || !series.rolling[k - 1] {
+                continue;
+            }
+            let change = state.slip[k] - state.slip[k - 1];
+            let direction = if change.value() >= 0.0 { 1.0 } else { -1.0 };
+            let stay = (-(change.abs() / p[1])).exp();
+            z = (z - direction) * stay + direction;
+            state.friction[k] = state.friction[k] * (p[0] * z + 1.0);
+        }
+    }
+    fn report(
+        &self,
+        p: &[T],
+        _law: &Law<T>,
+        _context: &Context,
+        _series: &[Series],
+    ) -> Vec<Reported<T>> {
+        vec![Reported {
+            name: "loop_share",
+            unit: "1",
+            value: p[0].abs(),
+        }]
+    }
+}

@@ -1,0 +1,155 @@
+//! Friction changes with sliding speed or vehicle speed.
+
+use super::{Context, Describe, Evidence, Id, Law, Mechanism, Parameter, Reported, Stage, State};
+use crate::number::Number;
+use crate::prepare::Series;
+
+/// Forms of the dependence.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Form {
+    /// Linear in sliding speed.
+    SlidingLinear,
+    /// Exponential in sliding speed.
+    SlidingExponential,
+    /// Linear in vehicle speed about its mean.
+    VehicleLinear,
+    /// Exponential in vehicle speed about its mean.
+    VehicleExponential,
+    /// Exponential in sliding speed towards a floor (Stribeck).
+    Stribeck,
+}
+
+/// All forms.
+pub const FORMS: [Form; 5] = [
+    Form::SlidingLinear,
+    Form::SlidingExponential,
+    Form::VehicleLinear,
+    Form::VehicleExponential,
+    Form::Stribeck,
+];
+
+/// Friction does not change its sign however steep the fitted line.
+fn floor_at<T: Number>(factor: T) -> T {
+    if factor.value() < 0.02 {
+        T::constant(0.02)
+    } else {
+        factor
+    }
+}
+
+/// Friction changes with sliding speed or vehicle speed.
+pub struct SpeedSensitivity {
+    /// Which form.
+    pub form: Form,
+}
+
+impl Describe for SpeedSensitivity {
+    fn id(&self) -> Id {
+        Id::SpeedSensitivity
+    }
+    fn form(&self) -> &'static str {
+        match self.form {
+            Form::SlidingLinear => "sliding_linear",
+            Form::SlidingExponential => "sliding_exponential",
+            Form::VehicleLinear => "vehicle_linear",
+            Form::VehicleExponential => "vehicle_exponential",
+            Form::Stribeck => "sliding_with_floor",
+        }
+    }
+    fn stage(&self) -> Stage {
+        Stage::Friction
+    }
+    fn parameters(&self, context: &Context) -> Vec<Parameter> {
+        let steepest = 3.0 / context.max_speed.max(0.5);
+        let slope = Parameter::new("friction_change_per_m_s", "s/m", -steepest, steepest);
+        match self.form {
+            Form::Stribeck => vec![
+                Parameter::new("floor", "1", 0.05, 2.5),
+                Parameter::new(
+                    "speed_scale",
+                    "m/s",
+                    0.01 * context.max_speed,
+                    3.0 * context.max_speed,
+                ),
+            ],
+            _ => vec![slope],
+        }
+    }
+    fn starts(
+        &self,
+        context: &Context,
+        _series: &[Series],
+        _evidence: &[Evidence],
+    ) -> Vec<Vec<f64>> {
+        match self.form {
+            Form::Stribeck => [0.03, 0.1, 0.3]
+                .iter()
+                .map(|share| vec![1.0, share * context.max_speed])
+                .collect(),
+            _ => vec![vec![0.0]],
+        }
+    }
+    fn equation(&self) -> &'static str {
+        match self.form {
+            Form::SlidingLinear => "friction = mu(slip) * (1 + k * slip * v)",
+            Form::SlidingExponential => "friction = mu(slip) * exp(k * slip * v)",
+            Form::VehicleLinear => "friction = mu(slip) * (1 + k * (v - mean v))",
+            Form::VehicleExponential => "friction = mu(slip) * exp(k * (v - mean v))",
+            Form::Stribeck => {
+                "friction = mu(slip) * (floor + (1 - floor) exp(-slip * v / speed_scale))"
+            }
+        }
+    }
+    fn statement(&self, reported: &[Reported<f64>], _p: &[f64]) -> String {
+        format!(
+            "friction changes by {:.2} % for each m/s of {} speed",
+            100.0 * reported[0].value,
+            if matches!(self.form, Form::VehicleLinear | Form::VehicleExponential) {
+                "vehicle"
+            } else {
+                "sliding"
+            }
+        )
+    }
+}
+
+impl<T: Number> Mechanism<T> for SpeedSensitivity {
+    fn apply(&self, p: &[T], series: &Series, context: &Context, state: &mut State<T>) {
+        for k in 0..state.friction.len() {
+            if !series.rolling[k] {
+                continue;
+            }
+            let v = state.speed[k];
+            let sliding = (state.slip[k] * v).abs();
+            let factor = match self.form {
+                Form::SlidingLinear => floor_at(p[0] * sliding + 1.0),
+                Form::SlidingExponential => (p[0] * sliding).exp(),
+                Form::VehicleLinear => floor_at(p[0] * (v - context.mean_speed) + 1.0),
+                Form::VehicleExponential => (p[0] * (v - context.mean_speed)).exp(),
+                Form::Stribeck => p[0] + (-p[0] + 1.0) * (-(sliding / p[1])).exp(),
+            };
+            state.friction[k] = state.friction[k] * factor;
+        }
+    }
+    fn report(
+        &self,
+        p: &[T],
+        _law: &Law<T>,
+        context: &Context,
+        _series: &[Series],
+    ) -> Vec<Reported<T>> {
+        let slope = match self.form {
+            // Mean slope from rest to the mean sliding speed of a skid, a fifth of the vehicle's.
+            Form::Stribeck => {
+                let sliding = 0.2 * context.mean_speed;
+                (p[0] - 1.0) * (-((-(T::constant(sliding) / p[1])).exp()) + 1.0) / sliding
+            }
+            _ => p[0],
+        };
+        vec![Reported {
+            name: "friction_change_per_m_s",
+            unit: "s/m",
+            value: slope,
+        }]
+    }
+}

@@ -1,0 +1,79 @@
+//! The load cell and its mount ring: a lightly damped second-order response.
+
+use super::filters::second_order;
+use super::{Context, Describe, Evidence, Id, Law, Mechanism, Parameter, Reported, Stage, State};
+use crate::number::Number;
+use crate::prepare::Series;
+
+/// The load cell and its mount ring: a lightly damped second-order response.
+pub struct StructuralResonance;
+
+impl Describe for StructuralResonance {
+    fn id(&self) -> Id {
+        Id::StructuralResonance
+    }
+    fn stage(&self) -> Stage {
+        Stage::Chain
+    }
+    fn parameters(&self, context: &Context) -> Vec<Parameter> {
+        vec![
+            Parameter::new("frequency", "Hz", 2.0, 0.45 / context.dt),
+            Parameter::new("damping_ratio", "1", 0.002, 0.5),
+        ]
+    }
+    fn starts(
+        &self,
+        context: &Context,
+        _series: &[Series],
+        _evidence: &[Evidence],
+    ) -> Vec<Vec<f64>> {
+        let top = 0.4 / context.dt;
+        let mut starts = Vec::new();
+        let mut frequency = 4.0;
+        while frequency < top.min(150.0) {
+            for damping in [0.03, 0.15] {
+                starts.push(vec![frequency, damping]);
+            }
+            frequency *= 1.19;
+        }
+        starts
+    }
+    fn amplitude(&self) -> Option<usize> {
+        None
+    }
+    fn equation(&self) -> &'static str {
+        "reading'' + 2 zeta W reading' + W^2 reading = W^2 drag, W = 2 pi frequency"
+    }
+    fn statement(&self, reported: &[Reported<f64>], _p: &[f64]) -> String {
+        format!(
+            "the load cell and its mount ring at {:.1} Hz with a damping ratio of {:.3}",
+            reported[0].value, reported[1].value
+        )
+    }
+}
+
+impl<T: Number> Mechanism<T> for StructuralResonance {
+    fn apply(&self, p: &[T], series: &Series, _context: &Context, state: &mut State<T>) {
+        second_order(&mut state.force, &series.dt, p[0], p[1]);
+    }
+    fn report(
+        &self,
+        p: &[T],
+        _law: &Law<T>,
+        _context: &Context,
+        _series: &[Series],
+    ) -> Vec<Reported<T>> {
+        vec![
+            Reported {
+                name: "frequency",
+                unit: "Hz",
+                value: p[0],
+            },
+            Reported {
+                name: "damping_ratio",
+                unit: "1",
+                value: p[1],
+            },
+        ]
+    }
+}

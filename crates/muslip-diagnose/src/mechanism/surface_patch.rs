@@ -1,0 +1,169 @@
+//! Friction differs over a stretch of the track.
+
+use super::{Context, Describe, Evidence, Id, Law, Mechanism, Parameter, Reported, Stage, State};
+use crate::number::Number;
+use crate::prepare::Series;
+
+/// Search over stretches of track: residual against predicted drag, by bins of distance.
+struct Scan {
+    bin: f64,
+    /// Σ w f r and Σ w f² by bin.
+    cross: Vec<f64>,
+    power: Vec<f64>,
+}
+
+impl Scan {
+    const BINS: usize = 96;
+
+    fn new(context: &Context, series: &[Series], evidence: &[Evidence]) -> Self {
+        let bin = (context.distance / Self::BINS as f64).max(1e-6);
+        let mut scan = Self {
+            bin,
+            cross: vec![0.0; Self::BINS],
+            power: vec![0.0; Self::BINS],
+        };
+        for (run, e) in series.iter().zip(evidence) {
+            for k in 0..run.len() {
+                let b = ((run.distance[k] / bin) as usize).min(Self::BINS - 1);
+                let (f, w) = (e.predicted[k], e.weight[k]);
+                if w > 0.0 {
+                    scan.cross[b] += w * f * e.residual[k].clamp(-4.0 / w.sqrt(), 4.0 / w.sqrt());
+                    scan.power[b] += w * f * f;
+                }
+            }
+        }
+        scan
+    }
+
+    /// Start, length and relative change of the stretch that explains most beyond a common factor.
+    fn best(&self) -> Option<(f64, f64, f64)> {
+        let all_cross: f64 = self.cross.iter().sum();
+        let all_power: f64 = self.power.iter().sum();
+        let mut best: Option<(f64, (f64, f64, f64))> = None;
+        for from in 0..Self::BINS {
+            let (mut c, mut q) = (0.0, 0.0);
+            for to in from..Self::BINS {
+                c += self.cross[to];
+                q += self.power[to];
+                let rest = all_power - q;
+                if q < 1e-4 * all_power || rest < 0.1 * all_power {
+                    continue;
+                }
+                let change = c / q - (all_cross - c) / rest;
+                let gain = change * change * q * rest / all_power;
+                if best.is_none_or(|b| gain > b.0) {
+                    let length = (to + 1 - from) as f64 * self.bin;
+                    best = Some((gain, (from as f64 * self.bin, length, change)));
+                }
+            }
+        }
+        best.map(|b| b.1)
+    }
+
+    /// Removes a stretch that has been found.
+    fn take(&mut self, from: f64, length: f64, change: f64) {
+        for b in 0..Self::BINS {
+            let centre = (b as f64 + 0.5) * self.bin;
+            if centre >= from && centre < from + length {
+                self.cross[b] -= change * self.power[b];
+            }
+        }
+    }
+}
+
+/// Friction differs over a stretch of the track.
+pub struct SurfacePatch {
+    /// Number of stretches.
+    pub patches: usize,
+}
+
+impl Describe for SurfacePatch {
+    fn id(&self) -> Id {
+        Id::SurfacePatch
+    }
+    fn form(&self) -> &'static str {
+        if self.patches == 1 { "one" } else { "two" }
+    }
+    fn stage(&self) -> Stage {
+        Stage::Friction
+    }
+    fn parameters(&self, context: &Context) -> Vec<Parameter> {
+        let mut all = Vec::new();
+        for i in 1..=self.patches {
+            all.push(Parameter::new(
+                &format!("start{i}"),
+                "m",
+                -1.0,
+                context.distance,
+            ));
+            all.push(Parameter::new(
+                &format!("length{i}"),
+                "m",
+                0.002 * context.distance,
+                context.distance,
+            ));
+            all.push(Parameter::new(&format!("change{i}"), "1", -0.95, 2.0));
+        }
+        all
+    }
+    fn starts(&self, context: &Context, series: &[Series], evidence: &[Evidence]) -> Vec<Vec<f64>> {
+        let mut scan = Scan::new(context, series, evidence);
+        let mut start = Vec::new();
+        for _ in 0..self.patches {
+            let Some((from, length, change)) = scan.best() else {
+                return Vec::new();
+            };
+            start.extend([from, length, 0.8 * change]);
+            scan.take(from, length, change);
+        }
+        vec![start]
+    }
+    fn amplitude(&self) -> Option<usize> {
+        Some(2)
+    }
+    fn equation(&self) -> &'static str {
+        "friction = mu(slip) * (1 + change) where start <= distance < end"
+    }
+    fn statement(&self, reported: &[Reported<f64>], p: &[f64]) -> String {
+        format!(
+            "friction is {:.1} % {} from {:.1} m to {:.1} m of the track",
+            100.0 * p[2].abs(),
+            if p[2] < 0.0 { "lower" } else { "higher" },
+            reported[0].value,
+            p[0] + p[1]
+        )
+    }
+}
+
+impl<T: Number> Mechanism<T> for SurfacePatch {
+    fn apply(&self, p: &[T], series: &Series, context: &Context, state: &mut State<T>) {
+        // Edges as wide as a contact patch, so that their places have a slope to follow.
+        let edge = (0.4 * context.radius).max(context.mean_speed * context.dt);
+        for (f, x) in state.friction.iter_mut().zip(&series.distance) {
+            let mut factor = T::constant(1.0);
+            for part in p.chunks_exact(3) {
+                let rise = (-(part[0] - *x) / edge).tanh();
+                let fall = (-(part[0] + part[1] - *x) / edge).tanh();
+                factor += part[2] * (rise - fall) * 0.5;
+            }
+            *f = *f * factor;
+        }
+    }
+    fn report(
+        &self,
+        p: &[T],
+        _law: &Law<T>,
+        _context: &Context,
+        _series: &[Series],
+    ) -> Vec<Reported<T>> {
+        let first = p
+            .chunks_exact(3)
+            .min_by(|a, b| a[0].value().total_cmp(&b[0].value()))
+            .map_or(T::constant(0.0), |part| part[0]);
+        vec![Reported {
+            name: "start",
+            unit: "m",
+            value: first,
+        }]
+    }
+}

@@ -1,0 +1,134 @@
+//! Friction changes with tread temperature, which friction power raises and time cools.
+
+use super::{Context, Describe, Evidence, Id, Law, Mechanism, Parameter, Reported, Stage, State};
+use crate::number::Number;
+use crate::prepare::Series;
+
+/// Forms of the dependence on temperature.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Form {
+    /// Logarithm of friction linear in temperature.
+    Linear,
+    /// With a quadratic term: friction that first rises with warming, then fades.
+    Curved,
+}
+
+/// All forms.
+pub const FORMS: [Form; 2] = [Form::Linear, Form::Curved];
+
+/// Friction changes with tread temperature, which friction power raises and time cools.
+pub struct ThermalFade {
+    /// Which form.
+    pub form: Form,
+}
+
+impl Describe for ThermalFade {
+    fn id(&self) -> Id {
+        Id::ThermalFade
+    }
+    fn form(&self) -> &'static str {
+        match self.form {
+            Form::Linear => "linear",
+            Form::Curved => "curved",
+        }
+    }
+    fn stage(&self) -> Stage {
+        Stage::Friction
+    }
+    fn parameters(&self, context: &Context) -> Vec<Parameter> {
+        let mut all = vec![
+            Parameter::new("sensitivity", "1/s", -6.0, 12.0),
+            Parameter::new(
+                "time_constant",
+                "s",
+                0.05,
+                (10.0 * context.duration).max(5.0),
+            ),
+        ];
+        if self.form == Form::Curved {
+            all.push(Parameter::new("curvature", "1/s2", -20.0, 20.0));
+        }
+        all
+    }
+    fn starts(
+        &self,
+        context: &Context,
+        _series: &[Series],
+        _evidence: &[Evidence],
+    ) -> Vec<Vec<f64>> {
+        [0.2, 0.6, 2.0, 6.0, 20.0, 60.0]
+            .iter()
+            .filter(|t| **t < 10.0 * context.duration)
+            .map(|t| {
+                if self.form == Form::Curved {
+                    vec![0.0, *t, 0.0]
+                } else {
+                    vec![0.0, *t]
+                }
+            })
+            .collect()
+    }
+    fn equation(&self) -> &'static str {
+        match self.form {
+            Form::Linear => {
+                "friction = mu(slip) exp(-c theta), d(theta)/dt = power/mean_power - theta/time_constant"
+            }
+            Form::Curved => {
+                "friction = mu(slip) exp(-c theta - c2 theta^2), d(theta)/dt = power/mean_power - theta/time_constant"
+            }
+        }
+    }
+    fn statement(&self, reported: &[Reported<f64>], p: &[f64]) -> String {
+        format!(
+            "friction {} as the tread heats; the heat decays with a time constant of {:.2} s",
+            if p[0] >= 0.0 { "fades" } else { "rises" },
+            reported[0].value
+        )
+    }
+}
+
+impl<T: Number> Mechanism<T> for ThermalFade {
+    fn apply(&self, p: &[T], series: &Series, context: &Context, state: &mut State<T>) {
+        let rate = T::constant(1.0) / p[1];
+        let mut theta = T::constant(0.0);
+        let scale = 1.0 / context.mean_power.max(1e-9);
+        let mut step = f64::NAN;
+        let mut stay = T::constant(1.0);
+        for k in 0..state.friction.len() {
+            if (series.dt[k] - step).abs() > 1e-9 || step.is_nan() {
+                step = series.dt[k];
+                stay = (-(rate * step)).exp();
+            }
+            let mut power = T::constant(0.0);
+            if series.rolling[k] {
+                let exponent = match p.get(2) {
+                    Some(c) => -(p[0] * theta + *c * theta.squared()),
+                    None => -(p[0] * theta),
+                };
+                let limited = if exponent.value() > 2.0 {
+                    T::constant(2.0)
+                } else {
+                    exponent
+                };
+                let faded = state.friction[k] * limited.exp();
+                state.friction[k] = faded;
+                power = (faded * state.load[k] * state.slip[k] * state.speed[k]).abs() * scale;
+            }
+            let settled = p[1] * power;
+            theta = (theta - settled) * stay + settled;
+        }
+    }
+    fn report(
+        &self,
+        p: &[T],
+        _law: &Law<T>,
+        _context: &Context,
+        _series: &[Series],
+    ) -> Vec<Reported<T>> {
+        vec![Reported {
+            name: "time_constant",
+            unit: "s",
+            value: p[1],
+        }]
+    }
+}

@@ -1,0 +1,53 @@
+//! The translating mass is not the rig file's.
+
+use super::{Context, Describe, Evidence, Id, Law, Mechanism, Parameter, Reported, Stage, State};
+use crate::number::Number;
+use crate::prepare::Series;
+
+/// The translating mass is not the rig file's.
+pub struct VehicleInertia;
+
+impl Describe for VehicleInertia {
+    fn id(&self) -> Id {
+        Id::VehicleInertia
+    }
+    fn stage(&self) -> Stage {
+        Stage::Vehicle
+    }
+    fn parameters(&self, _context: &Context) -> Vec<Parameter> {
+        vec![Parameter::new("mass_error", "1", -0.7, 2.0)]
+    }
+    fn starts(
+        &self,
+        _context: &Context,
+        _series: &[Series],
+        _evidence: &[Evidence],
+    ) -> Vec<Vec<f64>> {
+        vec![vec![0.0]]
+    }
+    fn equation(&self) -> &'static str {
+        "mass * dv/dt = -drag"
+    }
+    fn statement(&self, reported: &[Reported<f64>], _p: &[f64]) -> String {
+        format!("the translating mass is {:.4} kg", reported[0].value)
+    }
+}
+
+impl<T: Number> Mechanism<T> for VehicleInertia {
+    fn apply(&self, p: &[T], _series: &Series, _context: &Context, state: &mut State<T>) {
+        state.inertia_change += p[0];
+    }
+    fn report(
+        &self,
+        p: &[T],
+        _law: &Law<T>,
+        context: &Context,
+        _series: &[Series],
+    ) -> Vec<Reported<T>> {
+        vec![Reported {
+            name: "mass",
+            unit: "kg",
+            value: (p[0] + 1.0) * context.mass,
+        }]
+    }
+}

@@ -1,0 +1,175 @@
+//! The drag channel's zero moves with time.
+
+use super::{Context, Describe, Evidence, Id, Law, Mechanism, Parameter, Reported, Stage, State};
+use crate::number::Number;
+use crate::prepare::Series;
+
+/// How the zero moves, and on which clock.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Form {
+    /// Linear from the start of each run.
+    Linear,
+    /// Linear in each run, with an offset.
+    LinearOffset,
+    /// Linear through all runs.
+    LinearCumulative,
+    /// A warm-up in each run.
+    WarmUp,
+    /// A warm-up through all runs.
+    WarmUpCumulative,
+}
+
+impl Form {
+    fn cumulative(self) -> bool {
+        matches!(self, Self::LinearCumulative | Self::WarmUpCumulative)
+    }
+}
+
+/// All forms.
+pub const FORMS: [Form; 5] = [
+    Form::Linear,
+    Form::LinearOffset,
+    Form::LinearCumulative,
+    Form::WarmUp,
+    Form::WarmUpCumulative,
+];
+
+/// The drag channel's zero moves with time.
+pub struct ZeroDrift {
+    /// Which form.
+    pub form: Form,
+}
+
+impl Describe for ZeroDrift {
+    fn id(&self) -> Id {
+        Id::ZeroDrift
+    }
+    fn form(&self) -> &'static str {
+        match self.form {
+            Form::Linear => "linear_in_run",
+            Form::LinearOffset => "linear_with_offset",
+            Form::LinearCumulative => "linear_through_runs",
+            Form::WarmUp => "warm_up_in_run",
+            Form::WarmUpCumulative => "warm_up_through_runs",
+        }
+    }
+    fn stage(&self) -> Stage {
+        Stage::Reading
+    }
+    fn parameters(&self, context: &Context) -> Vec<Parameter> {
+        let force = context.max_drag.max(10.0 * context.drag_sigma);
+        let time = if self.form.cumulative() {
+            context.total_time
+        } else {
+            context.duration
+        }
+        .max(1e-3);
+        let slope = Parameter::new("slope", "N/s", -2.0 * force / time, 2.0 * force / time);
+        let offset = Parameter::new("offset", "N", -force, force);
+        match self.form {
+            Form::Linear | Form::LinearCumulative => vec![slope],
+            Form::LinearOffset => vec![slope, offset],
+            Form::WarmUp | Form::WarmUpCumulative => vec![
+                Parameter::new("rise", "N", -2.0 * force, 2.0 * force),
+                Parameter::new("time_constant", "s", 0.02 * context.duration, 5.0 * time),
+            ],
+        }
+    }
+    fn starts(
+        &self,
+        context: &Context,
+        _series: &[Series],
+        _evidence: &[Evidence],
+    ) -> Vec<Vec<f64>> {
+        let time = if self.form.cumulative() {
+            context.total_time
+        } else {
+            context.duration
+        };
+        match self.form {
+            Form::Linear => vec![vec![0.0]],
+            Form::LinearCumulative if context.runs > 1 => vec![vec![0.0]],
+            Form::LinearOffset => vec![vec![0.0, 0.0]],
+            Form::WarmUp => [0.06, 0.2, 0.7]
+                .iter()
+                .map(|share| vec![0.0, share * time])
+                .collect(),
+            Form::WarmUpCumulative if context.runs > 1 => [0.1, 0.4]
+                .iter()
+                .map(|share| vec![0.0, share * time])
+                .collect(),
+            _ => Vec::new(),
+        }
+    }
+    fn equation(&self) -> &'static str {
+        match self.form {
+            Form::Linear | Form::LinearCumulative => "reading = drag + slope * t",
+            Form::LinearOffset => "reading = drag + offset + slope * t",
+            Form::WarmUp | Form::WarmUpCumulative => {
+                "reading = drag + rise * (1 - exp(-t/time_constant))"
+            }
+        }
+    }
+    fn statement(&self, reported: &[Reported<f64>], p: &[f64]) -> String {
+        if reported[0].name == "slope" {
+            format!(
+                "the drag channel's zero moves by {:.3} N/s",
+                reported[0].value
+            )
+        } else {
+            format!(
+                "the drag channel's zero warms up by {:.1} N with a time constant of {:.2} s",
+                p[0], reported[0].value
+            )
+        }
+    }
+}
+
+impl<T: Number> Mechanism<T> for ZeroDrift {
+    fn apply(&self, p: &[T], series: &Series, context: &Context, state: &mut State<T>) {
+        let before = if self.form.cumulative() && !context.clock_continues {
+            context.before(series.index).time - series.time.first().copied().unwrap_or(0.0)
+        } else if self.form.cumulative() {
+            -context.first_time
+        } else {
+            -series.time.first().copied().unwrap_or(0.0)
+        };
+        for (y, t) in state.force.iter_mut().zip(&series.time) {
+            let since = t + before;
+            *y += match self.form {
+                Form::Linear | Form::LinearCumulative => p[0] * since,
+                Form::LinearOffset => p[0] * since + p[1],
+                Form::WarmUp | Form::WarmUpCumulative => {
+                    p[0] * (-((-(T::constant(since) / p[1])).exp()) + 1.0)
+                }
+            };
+        }
+    }
+    fn report(
+        &self,
+        p: &[T],
+        _law: &Law<T>,
+        _context: &Context,
+        _series: &[Series],
+    ) -> Vec<Reported<T>> {
+        match self.form {
+            Form::WarmUp | Form::WarmUpCumulative => vec![
+                Reported {
+                    name: "time_constant",
+                    unit: "s",
+                    value: p[1],
+                },
+                Reported {
+                    name: "rise",
+                    unit: "N",
+                    value: p[0],
+                },
+            ],
+            _ => vec![Reported {
+                name: "slope",
+                unit: "N/s",
+                value: p[0],
+            }],
+        }
+    }
+}

@@ -1,0 +1,277 @@
+//! The simulation: the base law with any set of mechanisms, run on one recording.
+
+use crate::data::{Catalogue, Listed};
+use crate::mechanism::{Context, Id, Law, Stage, State};
+use crate::prepare::Series;
+
+/// Parameters that every tyre model has: logarithms of peak friction and slip at the peak, and three
+/// shares that say how the inputs are to be read between raw and smoothed (no physics: see `prepare`).
+pub const TYRE_BASE: usize = 5;
+
+/// One mechanism in a model.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Term {
+    /// Entry of the catalogue.
+    pub entry: usize,
+    /// Its parameters.
+    pub parameters: Vec<f64>,
+}
+
+/// A model of one balance (or of wheel and vehicle together): base parameters, then the terms'.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Model {
+    /// Base parameters (none for wheel and vehicle).
+    pub base: Vec<f64>,
+    /// Mechanisms.
+    pub terms: Vec<Term>,
+}
+
+impl Model {
+    /// All parameters in one vector.
+    #[must_use]
+    pub fn vector(&self) -> Vec<f64> {
+        let mut p = self.base.clone();
+        for term in &self.terms {
+            p.extend_from_slice(&term.parameters);
+        }
+        p
+    }
+
+    /// The same model with other parameters.
+    #[must_use]
+    pub fn with(&self, p: &[f64]) -> Self {
+        let mut model = self.clone();
+        let (base, mut rest) = p.split_at(self.base.len());
+        model.base = base.to_vec();
+        for term in &mut model.terms {
+            let (own, others) = rest.split_at(term.parameters.len());
+            term.parameters = own.to_vec();
+            rest = others;
+        }
+        model
+    }
+
+    /// Catalogue entries in it.
+    #[must_use]
+    pub fn entries(&self) -> Vec<usize> {
+        self.terms.iter().map(|t| t.entry).collect()
+    }
+
+    /// Ids of its mechanisms, sorted.
+    #[must_use]
+    pub fn ids(&self, catalogue: &Catalogue) -> Vec<Id> {
+        let mut ids: Vec<Id> = self
+            .terms
+            .iter()
+            .map(|t| catalogue.get(t.entry).id())
+            .collect();
+        ids.sort_unstable();
+        ids
+    }
+}
+
+/// Slices of the parameter vector that belong to the terms.
+fn split<'a, T>(model: &'a Model, p: &'a [T]) -> impl Iterator<Item = (usize, &'a [T])> {
+    let mut at = model.base.len();
+    model.terms.iter().map(move |term| {
+        let from = at;
+        at += term.parameters.len();
+        (term.entry, &p[from..at])
+    })
+}
+
+/// Runs the tyre model on one recording up to the reading; `state.contact` is the force in the contact.
+pub fn tyre<T: Listed>(
+    catalogue: &Catalogue,
+    model: &Model,
+    p: &[T],
+    series: &Series,
+    context: &Context,
+) -> State<T> {
+    let n = series.len();
+    let [
+        log_peak,
+        log_critical,
+        raw_share,
+        smoother_share,
+        load_share,
+    ] = core::array::from_fn(|i| p[i]);
+    let mut state = State::empty();
+    // Shares that are exactly zero cost nothing to leave out.
+    let zero = T::constant(0.0);
+    let blend = |raw: &[f64], smooth: &[f64], smoother: &[f64]| -> Vec<T> {
+        if raw_share == zero && smoother_share == zero {
+            return smooth.iter().map(|x| T::constant(*x)).collect();
+        }
+        (0..n)
+            .map(|k| {
+                raw_share * (raw[k] - smooth[k])
+                    + smoother_share * (smoother[k] - smooth[k])
+                    + smooth[k]
+            })
+            .collect()
+    };
+    state.omega = blend(
+        &series.wheel.raw,
+        &series.wheel.smooth,
+        &series.wheel.smoother,
+    );
+    state.speed = blend(
+        &series.speed.raw,
+        &series.speed.smooth,
+        &series.speed.smoother,
+    );
+    state.load = (0..n)
+        .map(|k| load_share * (series.load.raw[k] - series.load.smooth[k]) + series.load.smooth[k])
+        .collect();
+    state.law = Law::rudd(log_peak.exp(), log_critical.exp());
+    let terms: Vec<(usize, &[T])> = split(model, p).collect();
+    let run = |stage: Stage, state: &mut State<T>| {
+        for (entry, own) in &terms {
+            let mechanism = T::entry(catalogue, *entry);
+            if mechanism.stage() == stage {
+                mechanism.apply(own, series, context, state);
+            }
+        }
+    };
+    run(Stage::Kinematics, &mut state);
+    let nominal_radius = T::constant(context.radius);
+    state.slip = (0..n)
+        .map(|k| {
+            if series.rolling[k] {
+                let radius = state.radius.as_ref().map_or(nominal_radius, |r| r[k]);
+                -(radius * state.omega[k] / state.speed[k]) + 1.0
+            } else {
+                zero
+            }
+        })
+        .collect();
+    run(Stage::Slip, &mut state);
+    run(Stage::Law, &mut state);
+    let inverse_critical = T::constant(1.0) / state.law.critical;
+    state.friction = (0..n)
+        .map(|k| {
+            let mut x = state.slip[k] * inverse_critical;
+            if let Some(factor) = &state.critical_factor {
+                x = x / factor[k];
+            }
+            let mu = state.law.friction(x);
+            match &state.peak_factor {
+                Some(factor) => mu * factor[k],
+                None => mu,
+            }
+        })
+        .collect();
+    run(Stage::Friction, &mut state);
+    state.force = (0..n).map(|k| state.friction[k] * state.load[k]).collect();
+    run(Stage::Contact, &mut state);
+    if terms
+        .iter()
+        .any(|(e, _)| T::entry(catalogue, *e).stage() > Stage::Contact)
+    {
+        state.contact = Some(state.force.clone());
+        run(Stage::Reading, &mut state);
+        // Order of the chain: the structure rings, the filter lags, the line delays, the input clips.
+        for id in [
+            Id::StructuralResonance,
+            Id::ForceLag,
+            Id::ForceDelay,
+            Id::ForceSaturation,
+        ] {
+            for (entry, own) in &terms {
+                let mechanism = T::entry(catalogue, *entry);
+                if mechanism.id() == id {
+                    mechanism.apply(own, series, context, &mut state);
+                }
+            }
+        }
+    }
+    state
+}
+
+/// Imbalance of the wheel, one value a step ending at each sample:
+/// J Δω/Δt − R drag + brake torque + what the terms add, in N m, with `chain` (reading minus contact
+/// force, from the tyre model) taken off the drag reading.
+pub fn wheel<T: Listed>(
+    catalogue: &Catalogue,
+    model: &Model,
+    p: &[T],
+    series: &Series,
+    context: &Context,
+    chain: Option<&[f64]>,
+) -> Vec<T> {
+    let n = series.len();
+    let Some(torque) = &series.torque else {
+        return vec![T::constant(0.0); n];
+    };
+    let mut state = State::empty();
+    state.opposing = vec![T::constant(0.0); n];
+    state.brake = torque.smooth.iter().map(|t| T::constant(*t)).collect();
+    for (entry, own) in split(model, p) {
+        let mechanism = T::entry(catalogue, entry);
+        if mechanism.stage() == Stage::Wheel || mechanism.id() == Id::ForceGain {
+            mechanism.apply(own, series, context, &mut state);
+        }
+    }
+    let true_share = T::constant(1.0) / (state.gain_change + 1.0);
+    let opposing = |k: usize| {
+        // Deviations from the base model act on smoothed columns, so that a parameter cannot buy
+        // anything by scaling noise.
+        let chain = chain.map_or(0.0, |c| c[k]);
+        let drag = (true_share - 1.0) * (series.drag_smooth[k] - chain) + (series.drag[k] - chain);
+        let brake = state.brake[k] + (torque.raw[k] - torque.smooth[k]);
+        state.inertia_change * (context.inertia * series.wheel.rate[k]) - drag * context.radius
+            + brake
+            + state.opposing[k]
+    };
+    let mut out = vec![T::constant(0.0); n];
+    let mut before = T::constant(0.0);
+    for (k, imbalance) in out.iter_mut().enumerate() {
+        let now = opposing(k);
+        if k > 0 {
+            let acceleration = (series.wheel.raw[k] - series.wheel.raw[k - 1]) / series.dt[k];
+            *imbalance = (now + before) * 0.5 + context.inertia * acceleration;
+        }
+        before = now;
+    }
+    out
+}
+
+/// Imbalance of the vehicle, one value a step: m Δv/Δt + drag + what the terms add, in N.
+pub fn vehicle<T: Listed>(
+    catalogue: &Catalogue,
+    model: &Model,
+    p: &[T],
+    series: &Series,
+    context: &Context,
+    chain: Option<&[f64]>,
+) -> Vec<T> {
+    let n = series.len();
+    let mut state = State::empty();
+    state.opposing = vec![T::constant(0.0); n];
+    for (entry, own) in split(model, p) {
+        let mechanism = T::entry(catalogue, entry);
+        if mechanism.stage() == Stage::Vehicle {
+            mechanism.apply(own, series, context, &mut state);
+        }
+    }
+    let true_share = T::constant(1.0) / (state.gain_change + 1.0);
+    let force = |k: usize| {
+        let chain = chain.map_or(0.0, |c| c[k]);
+        state.inertia_change * (context.mass * series.speed.rate[k])
+            + (true_share - 1.0) * (series.drag_smooth[k] - chain)
+            + (series.drag[k] - chain)
+            + state.opposing[k]
+    };
+    let mut out = vec![T::constant(0.0); n];
+    let mut before = T::constant(0.0);
+    for (k, imbalance) in out.iter_mut().enumerate() {
+        let now = force(k);
+        if k > 0 {
+            let acceleration = (series.speed.raw[k] - series.speed.raw[k - 1]) / series.dt[k];
+            *imbalance = (now + before) * 0.5 + context.mass * acceleration;
+        }
+        before = now;
+    }
+    out
+}

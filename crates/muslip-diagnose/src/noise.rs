@@ -1,0 +1,262 @@
+//! Noise from the data: how large, how coloured, and where. Models are compared on whitened
+//! innovations only, or slow noise would be read as physics.
+
+use core::ops::Range;
+
+use statrs::distribution::{ChiSquared, ContinuousCDF};
+
+/// Longest autoregression tried.
+const MAX_ORDER: usize = 6;
+/// Residuals are clipped at this many standard deviations before the autoregression is fitted.
+const CLIP: f64 = 3.5;
+/// Innovations beyond this many standard deviations count linearly (Huber 1964).
+pub const HUBER: f64 = 2.2;
+
+/// A stationary noise model: d = (1 − θB)/(1 − Σ aᵢBⁱ) e with white e of standard deviation `sigma`.
+///
+/// `theta` is the moving-average root that differencing a noisy speed leaves behind; it is zero for
+/// the tyre balance.
+#[derive(Clone, Debug)]
+pub struct Whitener {
+    /// Moving-average root, 0..1.
+    pub theta: f64,
+    /// Autoregressive coefficients.
+    pub ar: Vec<f64>,
+    /// Standard deviation of the innovations.
+    pub sigma: f64,
+}
+
+impl Whitener {
+    /// White noise of unit variance.
+    #[must_use]
+    pub fn unit() -> Self {
+        Self {
+            theta: 0.0,
+            ar: Vec::new(),
+            sigma: 1.0,
+        }
+    }
+
+    /// Number of innovations that `apply` yields for these segments.
+    #[must_use]
+    pub fn count(&self, segments: &[Range<usize>]) -> usize {
+        segments
+            .iter()
+            .map(|s| s.len().saturating_sub(self.ar.len()))
+            .sum()
+    }
+
+    /// Appends the innovations of `x` (in units of `sigma`) to `out`, segment by segment; the first
+    /// samples of a segment are conditioned on.
+    pub fn apply(&self, x: &[f64], segments: &[Range<usize>], out: &mut Vec<f64>) {
+        let order = self.ar.len();
+        let scale = 1.0 / self.sigma;
+        let mut history = [0.0; MAX_ORDER];
+        for segment in segments {
+            let mut previous = 0.0;
+            for (position, &value) in x[segment.clone()].iter().enumerate() {
+                let u = value + self.theta * previous;
+                previous = u;
+                if position >= order {
+                    let mut e = u;
+                    for (a, h) in self.ar.iter().zip(&history) {
+                        e -= a * h;
+                    }
+                    out.push(e * scale);
+                }
+                for i in (1..order).rev() {
+                    history[i] = history[i - 1];
+                }
+                if order > 0 {
+                    history[0] = u;
+                }
+            }
+        }
+    }
+
+    /// Fits the autoregression (order by BIC) and the innovation size to residuals in which no
+    /// mismatch is left, for a given moving-average root.
+    #[must_use]
+    pub fn fit(residual: &[f64], segments: &[Range<usize>], theta: f64) -> Self {
+        let unit = Self {
+            theta,
+            ar: Vec::new(),
+            sigma: 1.0,
+        };
+        let mut u = Vec::with_capacity(residual.len());
+        unit.apply(residual, segments, &mut u);
+        let level = robust_sigma(&u);
+        if !(level > 0.0) {
+            return Self { sigma: 1.0, ..unit };
+        }
+        for value in &mut u {
+            *value = value.clamp(-CLIP * level, CLIP * level);
+        }
+        let mut covariance = [0.0; MAX_ORDER + 1];
+        let mut start = 0;
+        let mut count = 0.0;
+        for segment in segments {
+            let part = &u[start..start + segment.len()];
+            start += segment.len();
+            count += part.len() as f64;
+            for (lag, c) in covariance.iter_mut().enumerate() {
+                if part.len() > lag {
+                    *c += part
+                        .iter()
+                        .zip(&part[lag..])
+                        .map(|(a, b)| a * b)
+                        .sum::<f64>();
+                }
+            }
+        }
+        let mut best = (f64::INFINITY, Vec::new());
+        for order in 0..=MAX_ORDER {
+            let (ar, variance) = levinson(&covariance, order);
+            let bic = count * variance.max(1e-300).ln() + order as f64 * count.max(2.0).ln();
+            if bic < best.0 - 1e-9 {
+                best = (bic, ar);
+            }
+        }
+        let mut fitted = Self {
+            theta,
+            ar: best.1,
+            sigma: 1.0,
+        };
+        let mut e = Vec::with_capacity(residual.len());
+        fitted.apply(residual, segments, &mut e);
+        fitted.sigma = robust_sigma(&e).max(1e-300);
+        fitted
+    }
+}
+
+fn levinson(covariance: &[f64], order: usize) -> (Vec<f64>, f64) {
+    let mut ar = vec![0.0; order];
+    let mut variance = covariance[0];
+    for m in 0..order {
+        if variance <= 0.0 {
+            break;
+        }
+        let mut reflection = covariance[m + 1];
+        for i in 0..m {
+            reflection -= ar[i] * covariance[m - i];
+        }
+        let k = (reflection / variance).clamp(-0.999, 0.999);
+        let previous = ar.clone();
+        ar[m] = k;
+        for i in 0..m {
+            ar[i] = previous[i] - k * previous[m - 1 - i];
+        }
+        variance *= 1.0 - k * k;
+    }
+    (ar, variance / covariance[0].max(1e-300))
+}
+
+/// Standard deviation with tails clipped at 3.5 of it, so that outliers do not set the scale.
+#[must_use]
+pub fn robust_sigma(values: &[f64]) -> f64 {
+    if values.is_empty() {
+        return 0.0;
+    }
+    let mut magnitudes: Vec<f64> = values.iter().map(|v| v.abs()).collect();
+    let median = 1.4826 * crate::smooth::median_in_place(&mut magnitudes);
+    let n = values.len() as f64;
+    let mut sigma = if median > 0.0 {
+        median
+    } else {
+        (values.iter().map(|v| v * v).sum::<f64>() / n).sqrt()
+    };
+    for _ in 0..4 {
+        let limit = CLIP * sigma;
+        let sum: f64 = values.iter().map(|v| v.abs().min(limit).powi(2)).sum();
+        // A normal variable clipped at 3.5 sigma keeps 0.9987 of its variance.
+        sigma = (sum / n / 0.9987).sqrt();
+    }
+    sigma
+}
+
+/// Huber's loss of one innovation, in nats: e²/2 inside `HUBER`, linear beyond.
+#[must_use]
+pub fn loss(e: f64) -> f64 {
+    let a = e.abs();
+    if a <= HUBER {
+        0.5 * e * e
+    } else {
+        HUBER * (a - 0.5 * HUBER)
+    }
+}
+
+/// Weight of an innovation in the normal equations: derivative of the loss over e.
+#[must_use]
+pub fn weight(e: f64) -> f64 {
+    let a = e.abs();
+    if a <= HUBER { 1.0 } else { HUBER / a }
+}
+
+/// Probability of so large a Ljung-Box statistic if the innovations were white (20 lags, with the
+/// variance of each autocorrelation taken robustly by clipping); `None` with too few of them.
+#[must_use]
+pub fn whiteness(innovations: &[f64]) -> Option<f64> {
+    const LAGS: usize = 20;
+    let n = innovations.len();
+    if n < 5 * LAGS {
+        return None;
+    }
+    let sigma = robust_sigma(innovations);
+    if !(sigma > 0.0) {
+        return None;
+    }
+    let clipped: Vec<f64> = innovations
+        .iter()
+        .map(|e| (e / sigma).clamp(-CLIP, CLIP))
+        .collect();
+    let power: f64 = clipped.iter().map(|e| e * e).sum();
+    let mut q = 0.0;
+    for lag in 1..=LAGS {
+        let r = clipped
+            .iter()
+            .zip(&clipped[lag..])
+            .map(|(a, b)| a * b)
+            .sum::<f64>()
+            / power;
+        q += r * r / (n - lag) as f64;
+    }
+    q *= n as f64 * (n as f64 + 2.0);
+    Some(chi_square_upper(q, LAGS as f64))
+}
+
+/// Upper tail of the chi-square distribution.
+#[must_use]
+pub fn chi_square_upper(x: f64, degrees: f64) -> f64 {
+    ChiSquared::new(degrees).map_or(1.0, |d| d.sf(x))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::SeedableRng;
+    use rand_distr::{Distribution, Normal};
+
+    #[test]
+    fn coloured_noise_is_whitened_and_its_size_found() {
+        let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(3);
+        let normal = Normal::new(0.0, 25.0).unwrap();
+        let mut x = vec![0.0; 20_000];
+        for k in 1..x.len() {
+            x[k] = 0.8 * x[k - 1] + normal.sample(&mut rng);
+        }
+        let all = 0..x.len();
+        let segments = [all];
+        let w = Whitener::fit(&x, &segments, 0.0);
+        assert!((w.ar[0] - 0.8).abs() < 0.03, "{w:?}");
+        assert!((w.sigma - 25.0).abs() < 0.6, "{w:?}");
+        let mut e = Vec::new();
+        w.apply(&x, &segments, &mut e);
+        assert!(whiteness(&e).unwrap() > 0.01);
+        assert!(whiteness(&x).unwrap() < 1e-6);
+    }
+
+    #[test]
+    fn tail_agrees_with_the_published_quantile() {
+        assert!((chi_square_upper(31.410, 20.0) - 0.05).abs() < 5e-4);
+    }
+}

@@ -1,0 +1,575 @@
+//! From a recorded run to what the models run on: cleaned, smoothed, with derived variables.
+//!
+//! Nothing is deleted: a value that cannot be used is replaced for the sake of its neighbours and its
+//! sample taken out of the balances that it would have entered; what was found is a [`DataFault`].
+
+use core::ops::Range;
+
+use crate::campaign::{Rig, Run};
+use crate::mechanism::Context;
+use crate::smooth::{Smoothed, difference_sigma, median_in_place, smooth};
+
+/// Slowest speed at which slip is defined, in m/s.
+const MIN_SPEED: f64 = 0.5;
+/// Smallest usable normal force as a share of the recording's median.
+const MIN_LOAD_SHARE: f64 = 0.02;
+/// Anything larger is no measurement.
+const ABSURD: f64 = 1e15;
+/// Longest run of missing values that is bridged by a straight line, in samples.
+const BRIDGE: usize = 4;
+/// Longest half-window of the smoother in s.
+const MAX_REACH_S: f64 = 0.04;
+
+/// Something wrong with the recording itself.
+#[derive(Clone, Debug, PartialEq)]
+pub struct DataFault {
+    /// The run's name.
+    pub recording: String,
+    /// The column's name.
+    pub channel: String,
+    /// Start of the affected stretch in s.
+    pub start_s: f64,
+    /// End of the affected stretch in s.
+    pub end_s: f64,
+    /// What is wrong, for a reader.
+    pub what: String,
+}
+
+/// A channel as the models use it.
+#[derive(Clone, Debug, Default)]
+pub struct Channel {
+    /// Cleaned but not smoothed.
+    pub raw: Vec<f64>,
+    /// Smoothed.
+    pub smooth: Vec<f64>,
+    /// Smoothed harder, the direction in which residual noise in `smooth` would be removed.
+    pub smoother: Vec<f64>,
+    /// Time derivative of the smoothed channel.
+    pub rate: Vec<f64>,
+    /// Standard deviation of the white noise in `raw`.
+    pub sigma: f64,
+    /// Variance of `smooth` as a share of that of `raw`.
+    pub variance_share: Vec<f64>,
+}
+
+/// A run, prepared.
+#[derive(Clone, Debug, Default)]
+pub struct Series {
+    /// The run's name.
+    pub name: String,
+    /// Time in s.
+    pub time: Vec<f64>,
+    /// Step to the sample from its predecessor in s (for the first: to its successor).
+    pub dt: Vec<f64>,
+    /// Typical step in s.
+    pub typical_dt: f64,
+    /// Wheel speed in rad/s.
+    pub wheel: Channel,
+    /// Vehicle speed in m/s.
+    pub speed: Channel,
+    /// Normal force in N.
+    pub load: Channel,
+    /// Cleaned drag reading in N; empty where the run has none.
+    pub drag: Vec<f64>,
+    /// Smoothed drag in N.
+    pub drag_smooth: Vec<f64>,
+    /// Standard deviation of the drag's sample-to-sample noise in N.
+    pub drag_sigma: f64,
+    /// Brake torque in N m that enters the wheel balance, where there is a brake column.
+    pub torque: Option<Channel>,
+    /// Distance run since the first sample in m.
+    pub distance: Vec<f64>,
+    /// Wheel angle since the first sample in rad.
+    pub angle: Vec<f64>,
+    /// Whether the sample stands still (slip undefined, no contact force).
+    pub still: Vec<bool>,
+    /// Whether the wheel rolls fast enough for slip to be defined.
+    pub rolling: Vec<bool>,
+    /// Stretches of samples usable in the tyre balance.
+    pub tyre: Vec<Range<usize>>,
+    /// Stretches usable in the wheel balance.
+    pub wheel_balance: Vec<Range<usize>>,
+    /// Stretches usable in the vehicle balance.
+    pub vehicle_balance: Vec<Range<usize>>,
+    /// Other columns, cleaned; in the campaign's order, absent ones all `NaN`.
+    pub extra: Vec<Vec<f64>>,
+    /// Position of the run in the campaign, 0-based, by the order given.
+    pub index: usize,
+}
+
+impl Series {
+    /// Number of samples.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.time.len()
+    }
+    /// Whether there are no samples.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.time.is_empty()
+    }
+    /// Slip from the smoothed speeds and the rig's radius; zero where it is not defined.
+    #[must_use]
+    pub fn slip(&self, k: usize, radius: f64) -> f64 {
+        if self.rolling[k] {
+            (self.speed.smooth[k] - radius * self.wheel.smooth[k]) / self.speed.smooth[k]
+        } else {
+            0.0
+        }
+    }
+    /// Friction power on the nominal curve in W.
+    #[must_use]
+    pub fn nominal_power(&self, k: usize, context: &Context) -> f64 {
+        if !self.rolling[k] {
+            return 0.0;
+        }
+        let slip = self.slip(k, context.radius);
+        let power =
+            self.load.smooth[k] * context.nominal_friction(slip) * slip * self.speed.smooth[k];
+        if power.is_finite() {
+            power.max(0.0)
+        } else {
+            0.0
+        }
+    }
+    /// Number of samples usable in the tyre balance.
+    #[must_use]
+    pub fn tyre_count(&self) -> usize {
+        self.tyre.iter().map(Range::len).sum()
+    }
+}
+
+/// Cleans one channel: absurd values, spikes, short gaps. Returns the cleaned values and whether each
+/// sample may be used.
+fn clean(
+    name: &str,
+    channel: &str,
+    time: &[f64],
+    values: &[f64],
+    faults: &mut Vec<DataFault>,
+) -> (Vec<f64>, Vec<bool>) {
+    let n = values.len();
+    let mut x: Vec<f64> = values
+        .iter()
+        .map(|v| if v.abs() < ABSURD { *v } else { f64::NAN })
+        .collect();
+    let mut report = |from: usize, to: usize, what: String| {
+        faults.push(DataFault {
+            recording: name.to_owned(),
+            channel: channel.to_owned(),
+            start_s: time.get(from).copied().unwrap_or(0.0),
+            end_s: time.get(to).copied().unwrap_or(0.0),
+            what,
+        });
+    };
+    let absurd: Vec<usize> = (0..n)
+        .filter(|&k| !values[k].is_nan() && !x[k].is_finite())
+        .collect();
+    if let (Some(&first), Some(&last)) = (absurd.first(), absurd.last()) {
+        report(
+            first,
+            last,
+            format!("{} values beyond any measurement", absurd.len()),
+        );
+    }
+    // Spikes: far from the median of four neighbours, by the noise and by the neighbours' own spread.
+    let sigma = difference_sigma(&x);
+    let mut spikes = Vec::new();
+    if sigma > 0.0 && n >= 7 {
+        let original = x.clone();
+        for k in 2..n - 2 {
+            if !original[k].is_finite() {
+                continue;
+            }
+            let mut near = [
+                original[k - 2],
+                original[k - 1],
+                original[k + 1],
+                original[k + 2],
+            ];
+            if near.iter().any(|v| !v.is_finite()) {
+                continue;
+            }
+            near.sort_by(f64::total_cmp);
+            let centre = 0.5 * (near[1] + near[2]);
+            let spread = near[3] - near[0];
+            if (original[k] - centre).abs() > 7.0 * sigma + 3.0 * spread {
+                spikes.push(k);
+            }
+        }
+        for &k in &spikes {
+            x[k] = f64::NAN;
+        }
+        if let (Some(&first), Some(&last)) = (spikes.first(), spikes.last()) {
+            report(first, last, format!("{} isolated outliers", spikes.len()));
+        }
+    }
+    // Frozen: the very same non-zero value for long, in a channel that otherwise moves.
+    let moving = sigma > 0.0;
+    let mut usable = vec![true; n];
+    let hold = 0.08_f64;
+    let mut k = 0;
+    while k < n {
+        let mut end = k + 1;
+        while end < n && x[end] == x[k] && x[k].is_finite() {
+            end += 1;
+        }
+        let long = end - k >= 20 && time[end - 1] - time[k] >= hold;
+        let everything = end - k > n * 3 / 4;
+        if moving && long && !everything && x[k] != 0.0 {
+            report(k, end - 1, "frozen or clipped".to_owned());
+            usable[k..end].fill(false);
+        }
+        k = end;
+    }
+    // Bridge what is missing.
+    let mut missing_cells = 0;
+    let mut long_gap: Option<(usize, usize)> = None;
+    let mut k = 0;
+    while k < n {
+        if x[k].is_finite() {
+            k += 1;
+            continue;
+        }
+        let mut end = k;
+        while end < n && !x[end].is_finite() {
+            end += 1;
+        }
+        missing_cells += end - k;
+        let before = if k > 0 { Some(x[k - 1]) } else { None };
+        let after = x.get(end).copied();
+        let short = end - k <= BRIDGE && before.is_some() && after.is_some();
+        for j in k..end {
+            x[j] = match (before, after) {
+                (Some(b), Some(a)) => {
+                    let w = (time[j] - time[k - 1]) / (time[end] - time[k - 1]);
+                    b + w * (a - b)
+                }
+                (Some(b), None) => b,
+                (None, Some(a)) => a,
+                (None, None) => f64::NAN,
+            };
+            usable[j] &= short;
+        }
+        if !short && end - k > long_gap.map_or(0, |(a, b)| b - a) {
+            long_gap = Some((k, end));
+        }
+        k = end;
+    }
+    if let Some((from, to)) = long_gap {
+        let what = if to - from == n {
+            "all values missing".to_owned()
+        } else {
+            format!("{missing_cells} values missing")
+        };
+        report(from, to - 1, what);
+    }
+    (x, usable)
+}
+
+fn stretches(usable: impl Fn(usize) -> bool, breaks: &[bool], minimum: usize) -> Vec<Range<usize>> {
+    let mut out = Vec::new();
+    let mut start = None;
+    for (k, &cut) in breaks.iter().enumerate() {
+        let ok = usable(k);
+        if let Some(from) = start
+            && (!ok || cut)
+        {
+            if k - from >= minimum {
+                out.push(from..k);
+            }
+            start = None;
+        }
+        if ok && start.is_none() {
+            start = Some(k);
+        }
+    }
+    if let Some(from) = start
+        && breaks.len() - from >= minimum
+    {
+        out.push(from..breaks.len());
+    }
+    out
+}
+
+fn channel(
+    time: &[f64],
+    raw: Vec<f64>,
+    segments: &[Range<usize>],
+    sigma: f64,
+    reach: &[f64],
+) -> Channel {
+    let Smoothed {
+        value,
+        rate,
+        variance_share,
+    } = smooth(time, &raw, segments, sigma, reach);
+    // One step further in the direction of more smoothing: a triangle over a quarter of the reach.
+    let mut smoother = value.clone();
+    for segment in segments {
+        for k in segment.clone() {
+            let quarter = 0.25 * reach[k];
+            let (mut sum, mut total) = (value[k], 1.0);
+            let mut step = 1;
+            loop {
+                let back = k.checked_sub(step).filter(|j| *j >= segment.start);
+                let ahead = Some(k + step).filter(|j| *j < segment.end);
+                let (Some(b), Some(a)) = (back, ahead) else {
+                    break;
+                };
+                let distance = 0.5 * (time[a] - time[b]);
+                if distance >= quarter {
+                    break;
+                }
+                let w = 1.0 - distance / quarter;
+                sum += w * (value[a] + value[b]);
+                total += 2.0 * w;
+                step += 1;
+            }
+            smoother[k] = sum / total;
+        }
+    }
+    Channel {
+        raw,
+        smooth: value,
+        smoother,
+        rate,
+        sigma,
+        variance_share,
+    }
+}
+
+/// Prepares one run. `extra_names` fixes the order of the other columns over the campaign.
+#[must_use]
+pub fn prepare(
+    rig: &Rig,
+    run: &Run,
+    extra_names: &[String],
+    index: usize,
+) -> (Series, Vec<DataFault>) {
+    let mut faults = Vec::new();
+    let time = &run.time_s;
+    let n = time.len();
+    let name = run.name.as_str();
+    let mut steps: Vec<f64> = time.windows(2).map(|w| w[1] - w[0]).collect();
+    let typical_dt = if steps.is_empty() {
+        1.0
+    } else {
+        median_in_place(&mut steps)
+    };
+    let mut dt = vec![typical_dt; n];
+    let mut breaks = vec![false; n];
+    for k in 1..n {
+        dt[k] = time[k] - time[k - 1];
+        breaks[k] = dt[k] > 3.5 * typical_dt;
+        if breaks[k] && dt[k] > 0.1 {
+            faults.push(DataFault {
+                recording: name.to_owned(),
+                channel: "time_s".to_owned(),
+                start_s: time[k - 1],
+                end_s: time[k],
+                what: format!("gap of {:.3} s", dt[k]),
+            });
+        }
+    }
+    if n > 1 {
+        dt[0] = dt[1];
+    }
+    let (omega, omega_ok) = clean(
+        name,
+        "wheel_speed_rad_s",
+        time,
+        &run.wheel_speed_rad_s,
+        &mut faults,
+    );
+    let (v, v_ok) = clean(
+        name,
+        "vehicle_speed_m_s",
+        time,
+        &run.vehicle_speed_m_s,
+        &mut faults,
+    );
+    let (load, load_ok) = clean(
+        name,
+        "normal_force_n",
+        time,
+        &run.normal_force_n,
+        &mut faults,
+    );
+    let has_drag = run.drag_force_n.len() == n && n > 0;
+    let (drag, mut drag_ok) = if has_drag {
+        clean(name, "drag_force_n", time, &run.drag_force_n, &mut faults)
+    } else {
+        (Vec::new(), vec![false; n])
+    };
+    // A drag channel frozen at its own extreme clips: that is the channel's physics
+    // (`force_saturation`), reported as a fault of the data but kept for the fit.
+    if has_drag {
+        let largest = drag.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        for k in 0..n {
+            if !drag_ok[k]
+                && run.drag_force_n[k].is_finite()
+                && drag[k] >= largest * (1.0 - 1e-9)
+                && largest > 0.0
+            {
+                drag_ok[k] = true;
+            }
+        }
+    }
+    let commanded = match (&run.brake_pressure_pa, rig.torque_per_pressure_nm_pa) {
+        (Some(p), Some(gain)) if p.iter().any(|x| x.is_finite()) => Some((
+            "brake_pressure_pa",
+            p.iter().map(|x| x * gain).collect::<Vec<f64>>(),
+        )),
+        _ => None,
+    };
+    let brake = commanded.or_else(|| {
+        run.brake_torque_nm
+            .as_ref()
+            .filter(|t| t.iter().any(|x| x.is_finite()))
+            .map(|t| ("brake_torque_nm", t.clone()))
+    });
+    let brake = brake.map(|(column, values)| clean(name, column, time, &values, &mut faults));
+
+    let finite = |k: usize| omega[k].is_finite() && v[k].is_finite() && load[k].is_finite();
+    let continuous = stretches(finite, &breaks, 3);
+    let omega_sigma = difference_sigma(&omega);
+    let v_sigma = difference_sigma(&v);
+    let load_sigma = difference_sigma(&load);
+    // No window may average over more than a sixth of a wheel revolution on either side.
+    let reach: Vec<f64> = (0..n)
+        .map(|k| {
+            let revolution = core::f64::consts::TAU / omega[k].abs().max(1.0);
+            MAX_REACH_S.min(revolution / 6.0).max(2.2 * typical_dt)
+        })
+        .collect();
+    let slow_reach: Vec<f64> = vec![(2.0 * MAX_REACH_S).max(4.2 * typical_dt); n];
+    let wheel = channel(time, omega, &continuous, omega_sigma, &reach);
+    let speed = channel(time, v, &continuous, v_sigma, &slow_reach);
+    let load = channel(time, load, &continuous, load_sigma, &reach);
+    let torque = brake.map(|(values, ok)| {
+        let sigma = difference_sigma(&values);
+        let finite_stretches = stretches(|k| values[k].is_finite(), &breaks, 3);
+        (channel(time, values, &finite_stretches, sigma, &reach), ok)
+    });
+    let (drag_sigma, drag_smooth) = if has_drag {
+        let sigma = difference_sigma(&drag);
+        let finite_stretches = stretches(|k| drag[k].is_finite(), &breaks, 3);
+        (
+            sigma,
+            smooth(time, &drag, &finite_stretches, sigma, &reach).value,
+        )
+    } else {
+        (0.0, Vec::new())
+    };
+
+    let mut loads: Vec<f64> = load
+        .smooth
+        .iter()
+        .copied()
+        .filter(|x| x.is_finite())
+        .collect();
+    let minimum_load = MIN_LOAD_SHARE * median_in_place(&mut loads).abs();
+    let still: Vec<bool> = (0..n)
+        .map(|k| {
+            let slow = 0.02_f64
+                .max(3.0 * v_sigma * speed.variance_share[k].sqrt())
+                .min(0.2);
+            speed.smooth[k].abs() < slow
+                && wheel.smooth[k].abs() * rig.radius_m < slow.max(3.0 * omega_sigma * rig.radius_m)
+        })
+        .collect();
+    let rolling: Vec<bool> = (0..n)
+        .map(|k| {
+            speed.smooth[k] >= MIN_SPEED && load.smooth[k] >= minimum_load && load.smooth[k] > 0.0
+        })
+        .collect();
+    let slip_sane = |k: usize| {
+        let v = speed.smooth[k];
+        let s = (v - rig.radius_m * wheel.smooth[k]) / v;
+        (-0.3..=1.3).contains(&s)
+    };
+    let base_ok = |k: usize| {
+        finite_at(&wheel.smooth, &speed.smooth, &load.smooth, k) && omega_ok[k] && v_ok[k]
+    };
+    let tyre = stretches(
+        |k| base_ok(k) && load_ok[k] && drag_ok[k] && (still[k] || (rolling[k] && slip_sane(k))),
+        &breaks,
+        10,
+    );
+    let wheel_balance = match &torque {
+        Some((t, ok)) => stretches(
+            |k| {
+                base_ok(k) && drag_ok[k] && ok[k] && t.smooth[k].is_finite() && speed.smooth[k] >= MIN_SPEED
+                // A locked wheel's brake torque is whatever holds it: the balance says nothing.
+                && wheel.smooth[k].abs() * rig.radius_m > 0.02 * speed.smooth[k]
+            },
+            &breaks,
+            10,
+        ),
+        None => Vec::new(),
+    };
+    let vehicle_balance = if rig.coasting {
+        stretches(
+            |k| base_ok(k) && drag_ok[k] && speed.smooth[k] >= MIN_SPEED,
+            &breaks,
+            10,
+        )
+    } else {
+        Vec::new()
+    };
+    let mut distance = vec![0.0; n];
+    let mut angle = vec![0.0; n];
+    for k in 1..n {
+        let step = |c: &[f64]| {
+            let mean = 0.5 * (c[k] + c[k - 1]);
+            if mean.is_finite() { mean * dt[k] } else { 0.0 }
+        };
+        distance[k] = distance[k - 1] + step(&speed.smooth);
+        angle[k] = angle[k - 1] + step(&wheel.smooth);
+    }
+    let extra = extra_names
+        .iter()
+        .map(|wanted| {
+            run.extra
+                .iter()
+                .find(|(column, _)| column == wanted)
+                .map_or_else(
+                    || vec![f64::NAN; n],
+                    |(column, values)| {
+                        let mut quiet = Vec::new();
+                        let (x, _) = clean(name, column, time, values, &mut quiet);
+                        faults.extend(quiet.into_iter().filter(|f| f.what.contains("all values")));
+                        x
+                    },
+                )
+        })
+        .collect();
+    let series = Series {
+        name: run.name.clone(),
+        time: time.clone(),
+        dt,
+        typical_dt,
+        wheel,
+        speed,
+        load,
+        drag,
+        drag_smooth,
+        drag_sigma,
+        torque: torque.map(|(c, _)| c),
+        distance,
+        angle,
+        still,
+        rolling,
+        tyre,
+        wheel_balance,
+        vehicle_balance,
+        extra,
+        index,
+    };
+    (series, faults)
+}
+
+fn finite_at(a: &[f64], b: &[f64], c: &[f64], k: usize) -> bool {
+    a[k].is_finite() && b[k].is_finite() && c[k].is_finite()
+}

@@ -1,0 +1,397 @@
+//! The repaired model as plain data: what `model.toml` holds, and how it predicts a recording.
+
+use std::collections::BTreeMap;
+
+use serde::{Deserialize, Serialize};
+
+use crate::campaign::{Rig, Run};
+use crate::data::{Catalogue, Data};
+use crate::mechanism::{Context, Parameter};
+use crate::model::{Model, Term, tyre};
+use crate::omnibus::{Action, Levers, Variable, hat};
+use crate::prepare::prepare;
+
+/// A mechanism with its parameters.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct RepairedTerm {
+    /// Id in the vocabulary.
+    pub id: String,
+    /// Form, empty where there is one only.
+    #[serde(default)]
+    pub form: String,
+    /// Equation, hidden states included.
+    pub equation: String,
+    /// Parameters in the form's order.
+    pub parameters: Vec<RepairedParameter>,
+}
+
+/// A parameter of a mechanism in a repaired model.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct RepairedParameter {
+    /// Name.
+    pub name: String,
+    /// Value.
+    pub value: f64,
+    /// Standard deviation.
+    pub std: f64,
+    /// Unit in ASCII.
+    pub unit: String,
+}
+
+/// An empirical correction: hat functions of a variable. Outside its domain it fades to zero.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Correction {
+    /// Variable.
+    pub variable: String,
+    /// `friction` (a factor 1 + c), `force` (added, in units of the mean load) or `critical_slip`.
+    pub acts_on: String,
+    /// Short form in words; empty where only the table holds.
+    #[serde(default)]
+    pub form: String,
+    /// Knots in the variable's unit, increasing.
+    pub knots: Vec<f64>,
+    /// Correction at each knot.
+    pub values: Vec<f64>,
+    /// For a periodic correction: angular rates in rad per unit of the variable with cosine and sine coefficients.
+    #[serde(default)]
+    pub harmonics: Vec<[f64; 3]>,
+}
+
+/// Size of the drag's noise: variance = constant² + (share · force)² and so on.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct NoiseModel {
+    /// Standard deviation of one drag sample in N.
+    pub sigma_n: f64,
+    /// Part of it that grows with the force, as a share of the force.
+    pub share_of_force: f64,
+    /// Autoregressive coefficients of its colour, at the fitted sampling step.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub step_s: Option<f64>,
+}
+
+/// The range of operation that the model was fitted on.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Domain {
+    /// Smallest and largest value by variable.
+    pub ranges: BTreeMap<String, [f64; 2]>,
+}
+
+/// A recording that the model was made from: what had happened before it began.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct KnownRecording {
+    /// Path as given.
+    pub path: String,
+    /// First time stamp in s, to recognise the file by.
+    pub first_time_s: f64,
+    /// Rows, to recognise the file by.
+    pub samples: usize,
+}
+
+/// A repaired model.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Repaired {
+    /// `muslip.model/1`.
+    pub schema: String,
+    /// Rig as declared.
+    pub rig: Rig,
+    /// Base law alone, refitted: logarithms of peak friction and slip at the peak, and the input shares.
+    pub base_alone: Vec<f64>,
+    /// The same five in the repaired tyre model.
+    pub base: Vec<f64>,
+    /// Mechanisms of the tyre balance.
+    #[serde(default)]
+    pub tyre: Vec<RepairedTerm>,
+    /// Mechanisms of the wheel and vehicle balances.
+    #[serde(default)]
+    pub dynamics: Vec<RepairedTerm>,
+    /// Empirical corrections of the tyre balance.
+    #[serde(default)]
+    pub corrections: Vec<Correction>,
+    /// Covariance of base and tyre parameters, row by row.
+    #[serde(default)]
+    pub covariance: Vec<Vec<f64>>,
+    /// Covariance of the dynamics' parameters, row by row.
+    #[serde(default)]
+    pub dynamics_covariance: Vec<Vec<f64>>,
+    /// Noise of a drag reading.
+    pub noise: NoiseModel,
+    /// Where it holds.
+    pub domain: Domain,
+    /// Sizes that give the parameters their scale.
+    pub context: Context,
+    /// Recordings that it was made from.
+    #[serde(default)]
+    pub recordings: Vec<KnownRecording>,
+}
+
+/// Which of the two models predicts.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Which {
+    /// The base law alone, refitted.
+    Base,
+    /// The repaired model.
+    Repaired,
+}
+
+/// A prediction of the drag reading, one value a row of the recording.
+#[derive(Clone, Debug, Default)]
+pub struct Prediction {
+    /// Time in s.
+    pub time_s: Vec<f64>,
+    /// Expected drag reading in N; finite on every row.
+    pub drag_force_n: Vec<f64>,
+    /// Standard deviation of a reading about it in N.
+    pub drag_force_sigma_n: Vec<f64>,
+    /// Expected contact force in N, before the measuring chain.
+    pub contact_force_n: Vec<f64>,
+}
+
+/// A model file that this program cannot run.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum RepairedError {
+    /// A mechanism or form that the vocabulary does not have.
+    #[error("unknown mechanism \"{0}\"")]
+    UnknownMechanism(String),
+    /// A mechanism with another number of parameters than its form has.
+    #[error("mechanism \"{id}\" takes {expected} parameters, not {found}")]
+    ParameterCount {
+        /// Mechanism.
+        id: String,
+        /// Number expected.
+        expected: usize,
+        /// Number found.
+        found: usize,
+    },
+    /// A value that is not finite, or a vector of the wrong length.
+    #[error("{0} is not a usable value")]
+    BadValue(String),
+}
+
+impl Repaired {
+    /// Describes the terms of a fitted model.
+    #[must_use]
+    pub fn terms(
+        catalogue: &Catalogue,
+        context: &Context,
+        model: &Model,
+        stds: &[f64],
+    ) -> Vec<RepairedTerm> {
+        let mut at = model.base.len();
+        model
+            .terms
+            .iter()
+            .map(|term| {
+                let mechanism = catalogue.get(term.entry);
+                let described: Vec<Parameter> = mechanism.parameters(context);
+                let from = at;
+                at += term.parameters.len();
+                RepairedTerm {
+                    id: mechanism.id().as_str().to_owned(),
+                    form: mechanism.form().to_owned(),
+                    equation: mechanism.equation().to_owned(),
+                    parameters: described
+                        .iter()
+                        .zip(&term.parameters)
+                        .enumerate()
+                        .map(|(i, (d, value))| RepairedParameter {
+                            name: d.name.clone(),
+                            value: *value,
+                            std: stds.get(from + i).copied().unwrap_or(0.0),
+                            unit: d.unit.to_owned(),
+                        })
+                        .collect(),
+                }
+            })
+            .collect()
+    }
+
+    fn model_of(
+        &self,
+        catalogue: &Catalogue,
+        base: &[f64],
+        terms: &[RepairedTerm],
+    ) -> Result<Model, RepairedError> {
+        let mut model = Model {
+            base: base.to_vec(),
+            terms: Vec::new(),
+        };
+        for term in terms {
+            let entry = catalogue
+                .entries()
+                .iter()
+                .position(|m| m.id().as_str() == term.id && m.form() == term.form)
+                .ok_or_else(|| {
+                    RepairedError::UnknownMechanism(
+                        format!("{} {}", term.id, term.form).trim().to_owned(),
+                    )
+                })?;
+            let expected = catalogue.get(entry).parameters(&self.context).len();
+            if expected != term.parameters.len() {
+                return Err(RepairedError::ParameterCount {
+                    id: term.id.clone(),
+                    expected,
+                    found: term.parameters.len(),
+                });
+            }
+            let parameters: Vec<f64> = term.parameters.iter().map(|p| p.value).collect();
+            if parameters.iter().any(|v| !v.is_finite()) {
+                return Err(RepairedError::BadValue(format!(
+                    "a parameter of {}",
+                    term.id
+                )));
+            }
+            model.terms.push(Term { entry, parameters });
+        }
+        Ok(model)
+    }
+
+    /// The tyre model in the engine's own form.
+    ///
+    /// # Errors
+    /// [`RepairedError`] where the file names what this program does not know.
+    pub fn tyre_model(&self, catalogue: &Catalogue, which: Which) -> Result<Model, RepairedError> {
+        let base = match which {
+            Which::Base => &self.base_alone,
+            Which::Repaired => &self.base,
+        };
+        if base.len() != crate::model::TYRE_BASE || base.iter().any(|v| !v.is_finite()) {
+            return Err(RepairedError::BadValue("base".to_owned()));
+        }
+        match which {
+            Which::Base => self.model_of(catalogue, base, &[]),
+            Which::Repaired => self.model_of(catalogue, base, &self.tyre),
+        }
+    }
+
+    /// Predicts the drag reading of a recording from its other columns.
+    ///
+    /// # Errors
+    /// [`RepairedError`] where the model cannot be run.
+    pub fn predict(&self, run: &Run, which: Which) -> Result<Prediction, RepairedError> {
+        let mut blind = run.clone();
+        blind.drag_force_n = Vec::new();
+        let index = self
+            .recordings
+            .iter()
+            .position(|r| {
+                r.samples == run.len()
+                    && run.time_s.first().is_some_and(|t| *t == r.first_time_s)
+                    && file_name(&r.path) == file_name(&run.name)
+            })
+            .unwrap_or(self.recordings.len());
+        let mut extra_names: Vec<String> = run.extra.iter().map(|(name, _)| name.clone()).collect();
+        extra_names.sort();
+        let (series, _) = prepare(&self.rig, &blind, &extra_names, index);
+        let data = Data {
+            rig: self.rig.clone(),
+            series: vec![series],
+            context: self.context.clone(),
+            extra_names,
+            faults: Vec::new(),
+            catalogue: Catalogue::default(),
+        };
+        let model = self.tyre_model(&data.catalogue, which)?;
+        let series = &data.series[0];
+        let state = tyre(
+            &data.catalogue,
+            &model,
+            &model.vector(),
+            series,
+            &data.context,
+        );
+        let contact = state.contact.clone().unwrap_or_else(|| state.force.clone());
+        let mut force = state.force;
+        if which == Which::Repaired && !self.corrections.is_empty() {
+            let levers = Levers::new(&data, &model);
+            for correction in &self.corrections {
+                let added = correction.apply(&data, &levers, 0)?;
+                for (f, a) in force.iter_mut().zip(added) {
+                    *f += a;
+                }
+            }
+        }
+        let mut last = 0.0;
+        for f in &mut force {
+            // A row without usable inputs gets its predecessor's prediction: never a gap in the file.
+            if f.is_finite() {
+                last = *f;
+            } else {
+                *f = last;
+            }
+        }
+        let drag_force_sigma_n = force
+            .iter()
+            .map(|f| self.noise.sigma_n.hypot(self.noise.share_of_force * f))
+            .collect();
+        Ok(Prediction {
+            time_s: run.time_s.clone(),
+            drag_force_n: force,
+            drag_force_sigma_n,
+            contact_force_n: contact
+                .iter()
+                .map(|f| if f.is_finite() { *f } else { 0.0 })
+                .collect(),
+        })
+    }
+}
+
+fn file_name(path: &str) -> &str {
+    path.rsplit(['/', '\\']).next().unwrap_or(path)
+}
+
+impl Correction {
+    /// Force added on one run in N.
+    ///
+    /// # Errors
+    /// [`RepairedError::BadValue`] for an action or a variable that does not exist.
+    pub fn apply(
+        &self,
+        data: &Data,
+        levers: &Levers,
+        run: usize,
+    ) -> Result<Vec<f64>, RepairedError> {
+        let action = Action::parse(&self.acts_on)
+            .ok_or_else(|| RepairedError::BadValue(format!("acts_on = \"{}\"", self.acts_on)))?;
+        let n = data.series[run].len();
+        let series = &data.series[run];
+        let values = if self.variable == "wheel_angle_rad" {
+            series.angle.clone()
+        } else {
+            match Variable::all(data)
+                .iter()
+                .find(|v| v.key(data) == self.variable)
+            {
+                Some(variable) => variable.values(data, run),
+                // A column that this recording does not have: no correction.
+                None => return Ok(vec![0.0; n]),
+            }
+        };
+        Ok((0..n)
+            .map(|k| {
+                let mut amount = match hat(&self.knots, values[k]) {
+                    Some((at, w)) if self.values.len() == self.knots.len() => {
+                        let inside = self.values[at] * (1.0 - w) + self.values[at + 1] * w;
+                        inside * self.fade(values[k])
+                    }
+                    _ => 0.0,
+                };
+                for [rate, cos, sin] in &self.harmonics {
+                    let (s, c) = (rate * values[k]).sin_cos();
+                    amount += cos * c + sin * s;
+                }
+                let lever = levers.of(data, action, run, k);
+                let added = amount * lever;
+                if added.is_finite() { added } else { 0.0 }
+            })
+            .collect())
+    }
+
+    /// One inside the knots, falling to zero within a quarter of their span outside.
+    fn fade(&self, u: f64) -> f64 {
+        let (Some(low), Some(high)) = (self.knots.first(), self.knots.last()) else {
+            return 0.0;
+        };
+        let outside = (low - u).max(u - high).max(0.0);
+        (1.0 - outside / (0.25 * (high - low)).max(1e-300)).max(0.0)
+    }
+}

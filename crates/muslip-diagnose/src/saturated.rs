@@ -1,0 +1,370 @@
+//! The noise of a balance, read off what a saturated model leaves over.
+//!
+//! A residual that still holds the mismatch would inflate the noise by the very thing that is looked
+//! for. So the residual is first regressed on everything that it may depend on (Mallows' argument), and
+//! only the rest is called noise: its size by operating region (heteroscedastic) and its colour.
+
+use crate::data::Data;
+use crate::fit::{BalanceNoise, Fitted, Problem};
+use crate::mechanism::Balance;
+use crate::model::Model;
+use crate::noise::{Whitener, robust_sigma};
+use crate::omnibus::{Action, Column, Levers, Regression, Variable, group};
+
+/// Times in s by which the predicted force is held back to stand for anything the chain may do.
+const TAPS_S: [f64; 8] = [0.002, 0.005, 0.010, 0.016, 0.024, 0.036, 0.055, 0.085];
+/// Moving-average roots tried for the balances that contain a differenced speed.
+const ROOTS: [f64; 12] = [
+    0.0, 0.3, 0.5, 0.7, 0.8, 0.88, 0.93, 0.96, 0.98, 0.99, 0.995, 0.999,
+];
+
+/// First guess of the noise, from sample-to-sample differences and the propagated slip noise.
+#[must_use]
+pub fn first_guess(data: &Data, balance: Balance) -> BalanceNoise {
+    let scale = data
+        .series
+        .iter()
+        .map(|s| match balance {
+            Balance::Tyre => {
+                let floor = s.drag_sigma.max(1e-6 * data.context.max_drag);
+                (0..s.len())
+                    .map(|k| {
+                        let slip = slip_noise(data, s.index, k);
+                        (floor * floor + slip * slip).sqrt()
+                    })
+                    .collect()
+            }
+            _ => vec![1.0; s.len()],
+        })
+        .collect();
+    BalanceNoise {
+        whitener: Whitener::unit(),
+        scale,
+    }
+}
+
+/// Force noise from the noise left in the smoothed slip, on the nominal curve, in N.
+fn slip_noise(data: &Data, run: usize, k: usize) -> f64 {
+    let s = &data.series[run];
+    if !s.rolling[k] {
+        return 0.0;
+    }
+    let v = s.speed.smooth[k];
+    let omega = s.wheel.smooth[k];
+    let radius = data.context.radius;
+    let by_wheel = radius / v * s.wheel.sigma * s.wheel.variance_share[k].sqrt();
+    let by_speed = radius * omega / (v * v) * s.speed.sigma * s.speed.variance_share[k].sqrt();
+    let x = s.slip(k, radius) / data.context.nominal[1];
+    let slope = 2.0 * data.context.nominal[0] / data.context.nominal[1] * (1.0 - x * x)
+        / (1.0 + x * x).powi(2);
+    s.load.smooth[k] * slope.abs() * by_wheel.hypot(by_speed)
+}
+
+/// Columns that together stand for whatever a tyre residual may depend on.
+fn tyre_columns(problem: &Problem<'_>, model: &Model) -> Vec<Column> {
+    let data = problem.data;
+    let levers = Levers::new(data, model);
+    let mut columns: Vec<Column> = Vec::new();
+    let mut add = |variable: Variable, action: Action, count: usize| {
+        if let Some(g) = group(problem, &levers, &variable, action, count) {
+            columns.extend(g.columns);
+        }
+    };
+    add(Variable::Slip, Action::Friction, 10);
+    add(Variable::SlidingSpeed, Action::Friction, 5);
+    add(Variable::VehicleSpeed, Action::Friction, 4);
+    add(Variable::NormalForce, Action::Friction, 3);
+    add(Variable::NormalForce, Action::Force, 3);
+    add(Variable::Time, Action::Friction, 5);
+    add(Variable::Time, Action::Force, 5);
+    add(Variable::Distance, Action::Friction, 12);
+    add(Variable::SlipRate, Action::CriticalSlip, 3);
+    add(Variable::SlipRate, Action::Friction, 3);
+    for i in 0..data.extra_names.len().min(4) {
+        add(Variable::Column(i), Action::Friction, 4);
+    }
+    let each = |f: &dyn Fn(usize, usize) -> f64| -> Column {
+        data.series
+            .iter()
+            .enumerate()
+            .map(|(run, s)| (0..s.len()).map(|k| f(run, k)).collect())
+            .collect()
+    };
+    // The reading held back: lags, delays, ringing.
+    for tap in TAPS_S {
+        if tap < 0.6 * data.context.dt {
+            continue;
+        }
+        columns.push(each(&|run, k| {
+            let back = (tap / data.series[run].typical_dt).round() as usize;
+            levers.reading[run][k.saturating_sub(back)]
+        }));
+    }
+    columns.push(each(&|run, k| data.series[run].wheel.rate[k]));
+    // Every run may sit a little higher or lower.
+    for own in problem.runs {
+        columns.push(each(&|run, k| {
+            if run == *own {
+                levers.force[run][k]
+            } else {
+                0.0
+            }
+        }));
+        columns.push(each(&|run, _| {
+            if run == *own {
+                data.context.mean_load
+            } else {
+                0.0
+            }
+        }));
+    }
+    if data.context.dt * data.context.mean_wheel_speed < 1.5 {
+        for order in [1.0, 2.0] {
+            columns.push(each(&|run, k| {
+                levers.force[run][k] * (order * data.series[run].angle[k]).sin()
+            }));
+            columns.push(each(&|run, k| {
+                levers.force[run][k] * (order * data.series[run].angle[k]).cos()
+            }));
+            columns.push(each(&|run, k| {
+                levers.critical[run][k] * (order * data.series[run].angle[k]).sin()
+            }));
+            columns.push(each(&|run, k| {
+                levers.critical[run][k] * (order * data.series[run].angle[k]).cos()
+            }));
+        }
+    }
+    columns
+}
+
+fn wheel_columns(data: &Data) -> Vec<Column> {
+    let each = |f: &dyn Fn(&crate::prepare::Series, usize) -> f64| -> Column {
+        data.series
+            .iter()
+            .map(|s| (0..s.len()).map(|k| f(s, k)).collect())
+            .collect()
+    };
+    let torque = |s: &crate::prepare::Series, k: usize, back_s: f64| {
+        let back = (back_s / s.typical_dt).round() as usize;
+        s.torque
+            .as_ref()
+            .map_or(0.0, |t| t.smooth[k.saturating_sub(back)])
+    };
+    let scale = data.context.mean_load * data.context.radius;
+    let mut columns = vec![
+        each(&|s, k| s.wheel.rate[k]),
+        each(&|_, _| scale),
+        each(&|s, k| s.drag_smooth.get(k).copied().unwrap_or(0.0)),
+        each(&|s, k| s.wheel.smooth[k]),
+        each(&|s, k| s.load.smooth[k]),
+    ];
+    for tap in [0.0, 0.01, 0.03, 0.08, 0.2] {
+        columns.push(each(&|s, k| torque(s, k, tap)));
+    }
+    for i in 0..4 {
+        columns.push(each(&|s, k| {
+            let share = k as f64 / s.len().max(1) as f64;
+            torque(s, k, 0.0) * (share * f64::from(i) * core::f64::consts::PI).cos()
+        }));
+    }
+    columns
+}
+
+fn vehicle_columns(data: &Data) -> Vec<Column> {
+    let each = |f: &dyn Fn(&crate::prepare::Series, usize) -> f64| -> Column {
+        data.series
+            .iter()
+            .map(|s| (0..s.len()).map(|k| f(s, k)).collect())
+            .collect()
+    };
+    let scale = data.context.mean_load;
+    vec![
+        each(&|_, _| scale),
+        each(&|s, k| s.speed.smooth[k]),
+        each(&|s, k| s.speed.smooth[k].powi(2)),
+        each(&|s, k| s.drag_smooth.get(k).copied().unwrap_or(0.0)),
+        each(&|s, k| s.speed.rate[k]),
+        each(&|s, k| scale * (k as f64 / s.len().max(1) as f64)),
+    ]
+}
+
+/// Columns for whatever wheel or vehicle may have wrong themselves.
+#[must_use]
+pub fn free_columns(data: &Data, balance: Balance) -> Vec<Column> {
+    let mut columns = match balance {
+        Balance::Wheel => wheel_columns(data),
+        _ => vehicle_columns(data),
+    };
+    for x in columns.iter_mut().flatten().flatten() {
+        *x = if x.is_finite() { *x } else { 0.0 };
+    }
+    columns
+}
+
+/// Noise of a balance given a fitted model: regresses its residual on everything, reads size and colour
+/// off the rest.
+#[must_use]
+pub fn estimate(guessed: &Problem<'_>, fitted: &Fitted) -> BalanceNoise {
+    let (data, balance, runs, guess) = (guessed.data, guessed.balance, guessed.runs, guessed.noise);
+    // Regress in the guessed scale but without its colour, so that columns keep their full weight.
+    let white = BalanceNoise {
+        whitener: Whitener {
+            sigma: guess.whitener.sigma.max(1e-300),
+            ..Whitener::unit()
+        },
+        scale: guess.scale.clone(),
+    };
+    let problem = Problem {
+        data,
+        balance,
+        noise: &white,
+        runs,
+        segments: guessed.segments,
+        chain: guessed.chain,
+    };
+    let mut columns = match balance {
+        Balance::Tyre => tyre_columns(&problem, &fitted.model),
+        _ => free_columns(data, balance),
+    };
+    columns.truncate((problem.count() / 12).max(2));
+    let regression = Regression::new(&problem, &fitted.model);
+    let references: Vec<&Column> = columns.iter().collect();
+    let found = regression.on(&problem, &references);
+    let mut rest: Vec<Vec<f64>> = vec![Vec::new(); data.series.len()];
+    for &run in runs {
+        let (mut residual, own_columns) = problem.slopes(&fitted.model, run);
+        for (column, c) in own_columns.iter().zip(&found.own) {
+            for (r, x) in residual.iter_mut().zip(column) {
+                *r += c * x;
+            }
+        }
+        for (column, c) in columns.iter().zip(&found.coefficients) {
+            for (r, x) in residual.iter_mut().zip(&column[run]) {
+                *r -= c * x;
+            }
+        }
+        rest[run] = residual;
+    }
+    let scale = match balance {
+        Balance::Tyre => tyre_scale(data, &problem, fitted, &rest, runs),
+        _ => guess.scale.clone(),
+    };
+    let mut joined = Vec::new();
+    let mut segments = Vec::new();
+    for &run in runs {
+        let offset = joined.len();
+        joined.extend(rest[run].iter().zip(&scale[run]).map(|(r, s)| r / s));
+        segments.extend(
+            problem
+                .segments(run)
+                .iter()
+                .map(|s| s.start + offset..s.end + offset),
+        );
+    }
+    let roots: &[f64] = if balance == Balance::Tyre {
+        &[0.0]
+    } else {
+        &ROOTS
+    };
+    let whitener = roots
+        .iter()
+        .map(|theta| Whitener::fit(&joined, &segments, *theta))
+        .min_by(|a, b| a.sigma.total_cmp(&b.sigma))
+        .unwrap_or_else(Whitener::unit);
+    BalanceNoise { whitener, scale }
+}
+
+/// Size of the tyre noise by sample: a constant, a share of the force, and the propagated slip noise.
+fn tyre_scale(
+    data: &Data,
+    problem: &Problem<'_>,
+    fitted: &Fitted,
+    rest: &[Vec<f64>],
+    runs: &[usize],
+) -> Vec<Vec<f64>> {
+    let levers = Levers::new(data, &fitted.model);
+    let mut features: Vec<[f64; 3]> = Vec::new();
+    let mut squares: Vec<f64> = Vec::new();
+    let mut all = Vec::new();
+    for &run in runs {
+        for segment in problem.segments(run) {
+            for k in segment.clone() {
+                features.push([
+                    1.0,
+                    levers.force[run][k].powi(2),
+                    slip_noise(data, run, k).powi(2),
+                ]);
+                squares.push(rest[run][k]);
+                all.push(rest[run][k]);
+            }
+        }
+    }
+    let typical = robust_sigma(&all).max(1e-300);
+    let mut parts = [typical * typical, 0.0, 0.0];
+    // Three passes of weighted least squares on clipped squares, each part held non-negative.
+    for _ in 0..4 {
+        let mut a = nalgebra::Matrix3::<f64>::zeros();
+        let mut b = nalgebra::Vector3::<f64>::zeros();
+        for (f, r) in features.iter().zip(&squares) {
+            let variance =
+                (parts[0] * f[0] + parts[1] * f[1] + parts[2] * f[2]).max(1e-4 * typical * typical);
+            let weight = 1.0 / (variance * variance);
+            let square = (r * r).min(10.0 * variance);
+            for i in 0..3 {
+                b[i] += weight * f[i] * square;
+                for j in 0..3 {
+                    a[(i, j)] += weight * f[i] * f[j];
+                }
+            }
+        }
+        let mut active = [true; 3];
+        for _ in 0..3 {
+            let places: Vec<usize> = (0..3).filter(|i| active[*i] && a[(*i, *i)] > 0.0).collect();
+            let matrix = nalgebra::DMatrix::from_fn(places.len(), places.len(), |i, j| {
+                let value = a[(places[i], places[j])]
+                    / (a[(places[i], places[i])] * a[(places[j], places[j])]).sqrt();
+                if i == j { value + 1e-9 } else { value }
+            });
+            let right = nalgebra::DVector::from_fn(places.len(), |i, _| {
+                b[places[i]] / a[(places[i], places[i])].sqrt()
+            });
+            let Some(solved) = matrix.cholesky().map(|c| c.solve(&right)) else {
+                break;
+            };
+            parts = [0.0; 3];
+            let mut negative = false;
+            for (i, &place) in places.iter().enumerate() {
+                let value = solved[i] / a[(place, place)].sqrt();
+                if value < 0.0 {
+                    active[place] = false;
+                    negative = true;
+                } else {
+                    parts[place] = value;
+                }
+            }
+            if !negative {
+                break;
+            }
+        }
+    }
+    let floor = 0.05 * typical * typical;
+    (0..data.series.len())
+        .map(|run| {
+            (0..data.series[run].len())
+                .map(|k| {
+                    let f = [
+                        1.0,
+                        levers.force[run][k].powi(2),
+                        slip_noise(data, run, k).powi(2),
+                    ];
+                    let variance = parts[0] * f[0] + parts[1] * f[1] + parts[2] * f[2];
+                    if variance.is_finite() {
+                        variance.max(floor).sqrt()
+                    } else {
+                        typical
+                    }
+                })
+                .collect()
+        })
+        .collect()
+}

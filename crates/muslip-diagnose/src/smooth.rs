@@ -1,0 +1,263 @@
+//! Adaptive smoothing of a measured channel: a local quadratic over the widest window that the data
+//! do not contradict (intersection of confidence intervals: Goldenshluger & Nemirovski 1997,
+//! Katkovnik 1999). Slip computed from raw speeds carries enough noise to make any causal filter look
+//! like physics (a "lag" merely averages it), so every model runs on smoothed inputs.
+
+use core::ops::Range;
+
+/// Window half-widths tried, in samples.
+const HALF_WIDTHS: [usize; 14] = [1, 2, 3, 4, 6, 8, 11, 15, 20, 27, 36, 48, 64, 85];
+/// Half-width of the confidence intervals that must intersect, in standard deviations.
+const CONFIDENCE: f64 = 1.8;
+
+/// A channel after smoothing.
+#[derive(Clone, Debug, Default)]
+pub struct Smoothed {
+    /// Smoothed value, in the channel's unit.
+    pub value: Vec<f64>,
+    /// Its time derivative, in the channel's unit per second.
+    pub rate: Vec<f64>,
+    /// Variance of the smoothed value as a share of the channel's noise variance, 0..=1.
+    pub variance_share: Vec<f64>,
+}
+
+/// Standard deviation of a channel's white noise from its third differences, robust to transients.
+///
+/// Missing values (`NaN`) are passed over. Zero where the channel is exactly smooth.
+#[must_use]
+pub fn difference_sigma(values: &[f64]) -> f64 {
+    let mut differences: Vec<f64> = values
+        .windows(4)
+        .map(|w| (w[0] - 3.0 * w[1] + 3.0 * w[2] - w[3]).abs())
+        .filter(|d| d.is_finite())
+        .collect();
+    if differences.is_empty() {
+        return 0.0;
+    }
+    let median = median_in_place(&mut differences);
+    if median > 0.0 {
+        1.4826 * median / 20f64.sqrt()
+    } else {
+        // More than half of the differences vanish (a coarse quantum or a held value): what is left
+        // of the noise shows in the mean square without the largest two percent.
+        let keep = differences.len() - differences.len() / 50;
+        differences.sort_by(f64::total_cmp);
+        let sum: f64 = differences[..keep].iter().map(|d| d * d).sum();
+        (sum / keep.max(1) as f64 / 20.0).sqrt()
+    }
+}
+
+/// Median; reorders its argument. `NaN` for an empty slice.
+pub fn median_in_place(values: &mut [f64]) -> f64 {
+    if values.is_empty() {
+        return f64::NAN;
+    }
+    let middle = values.len() / 2;
+    *values.select_nth_unstable_by(middle, f64::total_cmp).1
+}
+
+/// Smooths `values` inside each segment; `sigma` is the channel's noise, `reach_s[k]` the largest
+/// half-window at sample `k` in seconds.
+#[must_use]
+pub fn smooth(
+    time: &[f64],
+    values: &[f64],
+    segments: &[Range<usize>],
+    sigma: f64,
+    reach_s: &[f64],
+) -> Smoothed {
+    let n = values.len();
+    let mut out = Smoothed {
+        value: values.to_vec(),
+        rate: vec![0.0; n],
+        variance_share: vec![1.0; n],
+    };
+    for segment in segments {
+        for k in segment.clone() {
+            let local = local_fit(time, values, segment, k, sigma, reach_s[k]);
+            out.value[k] = local.value;
+            out.rate[k] = local.rate;
+            out.variance_share[k] = local.variance_share;
+        }
+    }
+    out
+}
+
+#[derive(Clone, Copy)]
+struct Local {
+    value: f64,
+    rate: f64,
+    variance_share: f64,
+}
+
+/// Moments of the window grown outwards from sample `k`.
+#[derive(Default)]
+struct Moments {
+    u: [f64; 5],
+    x: [f64; 3],
+    reference: f64,
+}
+
+impl Moments {
+    fn take(&mut self, offset: f64, value: f64) {
+        let x = value - self.reference;
+        let mut power = 1.0;
+        for order in 0..5 {
+            self.u[order] += power;
+            if order < 3 {
+                self.x[order] += power * x;
+            }
+            power *= offset;
+        }
+    }
+
+    /// Local quadratic (local line with fewer than five points) at offset zero.
+    fn solve(&self) -> Option<Local> {
+        let [n, u1, u2, u3, u4] = self.u;
+        let [x0, x1, x2] = self.x;
+        if n >= 5.0 {
+            let c00 = u2 * u4 - u3 * u3;
+            let c01 = u2 * u3 - u1 * u4;
+            let c02 = u1 * u3 - u2 * u2;
+            let determinant = n * c00 + u1 * c01 + u2 * c02;
+            if determinant <= 1e-12 * n * u2 * u4 {
+                return None;
+            }
+            let c11 = n * u4 - u2 * u2;
+            let c12 = u1 * u2 - n * u3;
+            Some(Local {
+                value: self.reference + (c00 * x0 + c01 * x1 + c02 * x2) / determinant,
+                rate: (c01 * x0 + c11 * x1 + c12 * x2) / determinant,
+                variance_share: c00 / determinant,
+            })
+        } else {
+            let determinant = n * u2 - u1 * u1;
+            if determinant <= 1e-12 * n * u2 || n < 2.0 {
+                return None;
+            }
+            Some(Local {
+                value: self.reference + (u2 * x0 - u1 * x1) / determinant,
+                rate: (n * x1 - u1 * x0) / determinant,
+                variance_share: u2 / determinant,
+            })
+        }
+    }
+}
+
+fn local_fit(
+    time: &[f64],
+    values: &[f64],
+    segment: &Range<usize>,
+    k: usize,
+    sigma: f64,
+    reach_s: f64,
+) -> Local {
+    let mut best = Local {
+        value: values[k],
+        rate: 0.0,
+        variance_share: 1.0,
+    };
+    let mut moments = Moments {
+        reference: values[k],
+        ..Moments::default()
+    };
+    moments.take(0.0, values[k]);
+    let (mut low, mut high) = (
+        values[k] - CONFIDENCE * sigma,
+        values[k] + CONFIDENCE * sigma,
+    );
+    let mut taken = 0;
+    let mut has_rate = false;
+    let scale = 1.0
+        / (time[(k + 1).min(segment.end - 1)] - time[k.saturating_sub(1).max(segment.start)])
+            .max(1e-9);
+    for half_width in HALF_WIDTHS {
+        let mut grew = false;
+        while taken < half_width {
+            taken += 1;
+            if k >= segment.start + taken {
+                let j = k - taken;
+                if time[k] - time[j] <= reach_s {
+                    moments.take((time[j] - time[k]) * scale, values[j]);
+                    grew = true;
+                }
+            }
+            if k + taken < segment.end {
+                let j = k + taken;
+                if time[j] - time[k] <= reach_s {
+                    moments.take((time[j] - time[k]) * scale, values[j]);
+                    grew = true;
+                }
+            }
+        }
+        if !grew {
+            break;
+        }
+        let Some(mut local) = moments.solve() else {
+            continue;
+        };
+        local.rate *= scale;
+        if local.variance_share >= 1.0 {
+            if !has_rate {
+                best.rate = local.rate;
+                has_rate = true;
+            }
+            continue;
+        }
+        let margin = CONFIDENCE * sigma * local.variance_share.sqrt();
+        low = low.max(local.value - margin);
+        high = high.min(local.value + margin);
+        if low > high {
+            if !has_rate {
+                best.rate = local.rate;
+            }
+            break;
+        }
+        best = local;
+        has_rate = true;
+    }
+    best
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::SeedableRng;
+    use rand_distr::{Distribution, Normal};
+
+    fn noisy(sigma: f64, truth: impl Fn(f64) -> f64) -> (Vec<f64>, Vec<f64>, Vec<f64>) {
+        let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(7);
+        let normal = Normal::new(0.0, sigma).unwrap();
+        let time: Vec<f64> = (0..2000).map(|k| f64::from(k) * 0.002).collect();
+        let clean: Vec<f64> = time.iter().map(|&t| truth(t)).collect();
+        let measured = clean.iter().map(|c| c + normal.sample(&mut rng)).collect();
+        (time, clean, measured)
+    }
+
+    #[test]
+    fn noise_level_is_read_off_third_differences() {
+        let (_, _, measured) = noisy(0.15, |t| 60.0 + 20.0 * (3.0 * t).sin());
+        assert!((difference_sigma(&measured) - 0.15).abs() < 0.01);
+    }
+
+    #[test]
+    fn smoothing_cuts_noise_and_keeps_a_step() {
+        let (time, clean, measured) = noisy(0.15, |t| {
+            if t < 2.0 {
+                60.0
+            } else {
+                60.0 - 400.0 * (t - 2.0).min(0.1)
+            }
+        });
+        let reach = vec![0.05; time.len()];
+        let all = 0..time.len();
+        let s = smooth(&time, &measured, &[all], 0.15, &reach);
+        let rms = |from: usize, to: usize| {
+            let sum: f64 = (from..to).map(|k| (s.value[k] - clean[k]).powi(2)).sum();
+            (sum / (to - from) as f64).sqrt()
+        };
+        assert!(rms(100, 900) < 0.06, "quiet part {}", rms(100, 900));
+        assert!(rms(980, 1070) < 0.16, "transition {}", rms(980, 1070));
+        assert!((s.rate[1025] + 400.0).abs() < 25.0, "rate {}", s.rate[1025]);
+    }
+}

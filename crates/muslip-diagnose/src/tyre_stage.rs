@@ -1,0 +1,279 @@
+//! The tyre balance: base fit, noise, mechanisms, and what they leave.
+
+use crate::choose::{Candidate, Limits, Search, refine, required, search};
+use crate::data::Data;
+use crate::dynamics_stage::CrossEvidence;
+use crate::fit::{BalanceNoise, Fitted, Joint, Problem};
+use crate::mechanism::{Balance, Stage};
+use crate::model::{Model, TYRE_BASE, tyre};
+use crate::omnibus::Levers;
+use crate::remainder::{Remainder, candidates, counterparts};
+use crate::saturated;
+use crate::split::Split;
+
+/// What the tyre balance says.
+pub struct TyreStage {
+    /// Noise under the final model.
+    pub noise: BalanceNoise,
+    /// All sets tried and the one chosen.
+    pub search: Search,
+    /// The repaired model before any correction.
+    pub model: Model,
+    /// The fit that the model came from.
+    pub fitted: Fitted,
+    /// Dependences that no mechanism explains, claimed in the result.
+    pub unexplained: Vec<Remainder>,
+    /// Corrections carried by the repaired model: those claimed, and what the form of a named mechanism leaves.
+    pub corrections: Vec<Remainder>,
+    /// Number of innovations fitted.
+    pub count: usize,
+}
+
+/// Fraction of a free dependence's gain that a set of mechanisms must reach to be preferred to it.
+const MECHANISM_SHARE: f64 = 0.85;
+
+/// A problem over the fitted part of the campaign.
+#[must_use]
+pub fn problem<'a>(data: &'a Data, split: &'a Split, noise: &'a BalanceNoise) -> Problem<'a> {
+    Problem {
+        data,
+        balance: Balance::Tyre,
+        noise,
+        runs: &split.fit_runs,
+        segments: split.fit.of(Balance::Tyre),
+        chain: None,
+    }
+}
+
+/// Start of the base fit: the rig file's law, inputs as smoothed.
+#[must_use]
+pub fn start(data: &Data) -> Model {
+    let [peak, critical] = data.context.nominal;
+    let mut base = vec![0.0; TYRE_BASE];
+    base[0] = peak.ln();
+    base[1] = critical.ln();
+    Model {
+        base,
+        terms: Vec::new(),
+    }
+}
+
+/// Best of several starts in the slip at the peak.
+fn base_fit(joint: &Joint<'_>) -> Fitted {
+    let first = start(joint.data());
+    let mut best = joint.fit(&first, 25);
+    for factor in [0.4f64, 2.5] {
+        let mut other = first.clone();
+        other.base[1] += factor.ln();
+        let fitted = joint.fit(&other, 25);
+        if fitted.loss < best.loss - 1e-6 {
+            best = fitted;
+        }
+    }
+    best
+}
+
+/// Reading minus contact force on every run: what the measuring chain adds.
+#[must_use]
+pub fn chain(data: &Data, model: &Model) -> Option<Vec<Vec<f64>>> {
+    let acts = model
+        .terms
+        .iter()
+        .any(|t| data.catalogue.get(t.entry).stage() > Stage::Contact);
+    acts.then(|| {
+        let p = model.vector();
+        data.series
+            .iter()
+            .map(|series| {
+                let state = tyre(&data.catalogue, model, &p, series, &data.context);
+                let contact = state.contact.unwrap_or_else(|| state.force.clone());
+                state
+                    .force
+                    .iter()
+                    .zip(&contact)
+                    .map(|(r, c)| if (r - c).is_finite() { r - c } else { 0.0 })
+                    .collect()
+            })
+            .collect()
+    })
+}
+
+/// Analyses the tyre balance; `None` where it holds nothing that could be fitted.
+#[must_use]
+pub fn analyse(
+    data: &Data,
+    split: &Split,
+    limits: &Limits,
+    progress: &dyn Fn(f64, &str),
+) -> Option<TyreStage> {
+    let guess = saturated::first_guess(data, Balance::Tyre);
+    let guessed = Joint {
+        parts: vec![problem(data, split, &guess)],
+    };
+    if guessed.count() < 60 {
+        return None;
+    }
+    progress(0.1, "fitting the base law");
+    let base = base_fit(&guessed);
+    let noise = saturated::estimate(&guessed.parts[0], &base);
+    let joint = Joint {
+        parts: vec![problem(data, split, &noise)],
+    };
+    let base = joint.fit(&base.model, 20);
+    if !speaks(&joint, &base) {
+        return None;
+    }
+    progress(0.2, "screening mechanisms");
+    let mut found = search(&joint, base, limits);
+    let mut noise = noise.clone();
+    if !found.chosen.ids.is_empty() {
+        progress(0.5, "judging again under the noise that is left");
+        noise = saturated::estimate(&joint.parts[0], &found.chosen.fitted);
+        let sharper = Joint {
+            parts: vec![problem(data, split, &noise)],
+        };
+        found = refine(&sharper, &found, limits);
+    }
+    if !found.chosen.ids.is_empty()
+        && let Some(cross) = CrossEvidence::new(
+            data,
+            split,
+            limits,
+            chain(data, &found.chosen.fitted.model).as_deref(),
+        )
+    {
+        found = cross.rerank(found);
+    }
+    progress(0.65, "looking at what is left");
+    let joint = Joint {
+        parts: vec![problem(data, split, &noise)],
+    };
+    Some(remainders(&joint, found, noise.clone(), limits))
+}
+
+/// Whether the recordings say anything about friction: a law must do better than no force at all.
+fn speaks(joint: &Joint<'_>, base: &Fitted) -> bool {
+    let silent = base.model.with(&{
+        let mut p = base.model.vector();
+        p[0] = -30.0;
+        p
+    });
+    joint.loss(&silent) - base.loss > 60.0
+}
+
+fn remainders(
+    joint: &Joint<'_>,
+    mut found: Search,
+    noise: BalanceNoise,
+    limits: &Limits,
+) -> TyreStage {
+    let problem = &joint.parts[0];
+    let count = found.count;
+    let data = joint.data();
+    let explained = found.base.criterion - found.chosen.criterion;
+    let left = candidates(problem, &found.chosen.fitted.model);
+    let mut unexplained: Vec<Remainder> = Vec::new();
+    let mut corrections: Vec<Remainder> = Vec::new();
+    if found.chosen.ids.is_empty() {
+        if let Some(top) = left.first()
+            && top.worth(count) >= required(limits, count, 0.0)
+        {
+            unexplained.push(top.clone());
+            corrections.push(top.clone());
+        }
+    } else {
+        // Does one free dependence account for more than the mechanisms do?
+        let free = candidates(problem, &found.base.fitted.model);
+        let rival = free.first().filter(|top| {
+            top.worth(count) * MECHANISM_SHARE > explained
+                && !counterparts(&top.word, &data.context)
+                    .iter()
+                    .any(|id| found.chosen.ids.contains(id))
+        });
+        let best_left = left.first();
+        if let Some(rival) = rival {
+            // Together they may be needed: then both are said.
+            let together = explained + best_left.map_or(0.0, |l| l.worth(count).max(0.0));
+            if together - rival.worth(count) < required(limits, count, rival.worth(count)) {
+                let base = found.base.clone();
+                found.chosen = Candidate { ..base };
+                unexplained.push(rival.clone());
+                corrections.push(rival.clone());
+            }
+        }
+        if unexplained.is_empty()
+            && let Some(top) = best_left
+        {
+            if top.worth(count) >= required(limits, count, 2.0 * explained) {
+                unexplained.push(top.clone());
+                corrections.push(top.clone());
+            } else if top.worth(count) > 25.0 && top.variable.is_some() {
+                corrections.push(top.clone());
+            }
+        }
+    }
+    // The model's own parameters step along with the correction that they were regressed with.
+    let fitted = found.chosen.fitted.clone();
+    let mut model = fitted.model.clone();
+    if let Some(first) = corrections.first() {
+        let bounds = joint.bounds(&model);
+        let moved: Vec<f64> = model
+            .vector()
+            .iter()
+            .zip(&first.own)
+            .zip(&bounds)
+            .map(|((x, d), (low, high))| (x + d).clamp(*low, *high))
+            .collect();
+        model = model.with(&moved);
+    }
+    TyreStage {
+        noise,
+        search: found,
+        model,
+        fitted,
+        unexplained,
+        corrections,
+        count,
+    }
+}
+
+impl TyreStage {
+    /// Prediction of the repaired model on a run, corrections included, in N.
+    #[must_use]
+    pub fn repaired(&self, data: &Data, run: usize) -> Vec<f64> {
+        let p = self.model.vector();
+        let mut force = tyre(
+            &data.catalogue,
+            &self.model,
+            &p,
+            &data.series[run],
+            &data.context,
+        )
+        .force;
+        if !self.corrections.is_empty() {
+            let levers = Levers::new(data, &self.model);
+            for c in &self.corrections {
+                if let Ok(added) = c.correction.apply(data, &levers, run) {
+                    for (f, a) in force.iter_mut().zip(added) {
+                        *f += a;
+                    }
+                }
+            }
+        }
+        force
+    }
+
+    /// Prediction of the base law alone on a run in N.
+    #[must_use]
+    pub fn base(&self, data: &Data, run: usize) -> Vec<f64> {
+        let model = &self.search.base.fitted.model;
+        tyre(
+            &data.catalogue,
+            model,
+            &model.vector(),
+            &data.series[run],
+            &data.context,
+        )
+        .force
+    }
+}

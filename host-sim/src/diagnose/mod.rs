@@ -1,0 +1,3 @@
+//! `muslip diagnose`, `muslip predict`: files in, engine, files out.
+
+pub mod load;
