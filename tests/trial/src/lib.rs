@@ -1,0 +1,25 @@
+//! Sealed trials of `muslip diagnose`.
+//!
+//! `generate` writes campaigns of recordings in which effects are concealed, made by physics of its
+//! own; `score` runs the tool on them as a user would, then opens the sealed truth and judges. The
+//! crate depends on no other member of the workspace: it knows the tool by its files alone.
+#![forbid(unsafe_code)]
+
+mod campaign;
+mod chain;
+mod draw;
+mod effect;
+mod figures;
+mod files;
+mod form;
+mod measure;
+mod noise;
+mod oracle;
+mod plan;
+mod rig;
+mod sim;
+mod strata;
+mod tyre;
+
+pub use files::generate;
+pub use strata::Request;
