@@ -9,6 +9,7 @@ pub mod fit;
 pub mod input_error;
 pub mod measure;
 pub mod output;
+pub mod paper;
 pub mod recording;
 pub mod report;
 pub mod rig_file;

@@ -7,6 +7,7 @@ mod completions;
 mod demo;
 mod estimate;
 mod fit;
+mod paper;
 mod progress;
 mod simulate;
 mod terminal;
@@ -41,6 +42,7 @@ enum Command {
     Estimate(estimate::Arguments),
     Fit(fit::Arguments),
     Simulate(simulate::Arguments),
+    Paper(paper::Arguments),
     Demo(demo::Arguments),
     Completions(completions::Arguments),
 }
@@ -95,6 +97,7 @@ pub fn main() -> ExitCode {
         Command::Estimate(arguments) => estimate::run(&arguments, &mut terminal),
         Command::Fit(arguments) => fit::run(&arguments, &mut terminal),
         Command::Simulate(arguments) => simulate::run(&arguments, &mut terminal),
+        Command::Paper(arguments) => paper::run(&arguments, &mut terminal),
         Command::Demo(arguments) => demo::run(&arguments, &mut terminal),
         Command::Completions(arguments) => completions::run(&arguments, &mut terminal),
     };

@@ -69,7 +69,31 @@ pub enum Block {
     },
     /// A figure with its caption.
     Figure(Figure),
+    /// Figures one after the other, at the reader's pace.
+    Animation(Vec<AnimationFrame>),
+    /// A link to a file beside the page.
+    Link {
+        /// What the reader sees.
+        text: String,
+        /// The file, relative to the page.
+        target: String,
+    },
 }
+
+/// One picture of an animation.
+#[derive(Debug, Clone, PartialEq)]
+pub struct AnimationFrame {
+    /// The picture; all frames of an animation should have the same axes and legend.
+    pub figure: Figure,
+    /// What the reader is told below it.
+    pub note: String,
+}
+
+/// Plays animations; the only script that a page may hold.
+const ANIMATION_SCRIPT: &str = include_str!("../../templates/animation.js");
+
+/// What the page's content security policy lets run: this script and no other.
+const ANIMATION_SCRIPT_HASH: &str = "sha256-FKBn/1121JJdcHjHY1QEL3LNvF78AsGHa0xfNPsPzbk=";
 
 /// A report that could not be made.
 #[derive(Debug, thiserror::Error)]
@@ -89,6 +113,9 @@ struct Page<'a> {
     verdict: String,
     tone: &'static str,
     sections: Vec<DrawnSection<'a>>,
+    animated: bool,
+    script: &'static str,
+    script_hash: &'static str,
     version: &'static str,
 }
 
@@ -108,10 +135,21 @@ enum DrawnBlock<'a> {
         narrow: String,
         caption: &'a str,
     },
+    Animation(Vec<DrawnFrame<'a>>),
+    Link {
+        text: &'a str,
+        target: &'a str,
+    },
+}
+
+struct DrawnFrame<'a> {
+    wide: String,
+    narrow: String,
+    note: &'a str,
 }
 
 impl Report {
-    /// The page: self-contained, without script, all text escaped.
+    /// The page: self-contained, all text escaped, without script unless it holds an animation.
     ///
     /// # Errors
     /// [`ReportError`] if a figure cannot be drawn or the page cannot be put together; neither depends
@@ -129,6 +167,8 @@ impl Report {
                         narrow: for_page(figure, Size::Narrow)?,
                         caption: &figure.caption,
                     },
+                    Block::Animation(frames) => DrawnBlock::Animation(drawn_frames(frames)?),
+                    Block::Link { text, target } => DrawnBlock::Link { text, target },
                 });
             }
             sections.push(DrawnSection {
@@ -145,11 +185,34 @@ impl Report {
                 Tone::Neutral => "neutral",
                 Tone::Warning => "warning",
             },
+            animated: self.is_animated(),
+            script: ANIMATION_SCRIPT,
+            script_hash: ANIMATION_SCRIPT_HASH,
             sections,
             version: env!("CARGO_PKG_VERSION"),
         };
         Ok(page.render()?)
     }
+
+    fn is_animated(&self) -> bool {
+        self.sections
+            .iter()
+            .flat_map(|section| &section.blocks)
+            .any(|block| matches!(block, Block::Animation(_)))
+    }
+}
+
+fn drawn_frames(frames: &[AnimationFrame]) -> Result<Vec<DrawnFrame<'_>>, DrawError> {
+    frames
+        .iter()
+        .map(|frame| {
+            Ok(DrawnFrame {
+                wide: for_page(&frame.figure, Size::Wide)?,
+                narrow: for_page(&frame.figure, Size::Narrow)?,
+                note: &frame.note,
+            })
+        })
+        .collect()
 }
 
 #[cfg(test)]
@@ -204,5 +267,28 @@ mod tests {
         for outside in ["http://", "https://", "src=", "url(", "@import"] {
             assert!(!page.contains(outside), "{outside}");
         }
+    }
+
+    #[test]
+    fn the_only_script_is_the_one_that_the_policy_names() {
+        use base64::Engine;
+        use sha2::Digest;
+        let digest = sha2::Sha256::digest(ANIMATION_SCRIPT);
+        let hash = base64::engine::general_purpose::STANDARD.encode(digest);
+        assert_eq!(ANIMATION_SCRIPT_HASH, format!("sha256-{hash}"));
+
+        let mut still = report("text");
+        assert!(!still.to_html().unwrap().contains("script"));
+        let frame = AnimationFrame {
+            figure: Figure::new("<b>", Axis::new("x"), Axis::new("y")),
+            note: "<script>alert(1)</script>".into(),
+        };
+        still.sections[0].blocks = vec![Block::Animation(vec![frame.clone(), frame])];
+        let page = still.to_html().unwrap();
+        assert!(page.contains(&format!("script-src '{ANIMATION_SCRIPT_HASH}';")));
+        assert!(page.contains(&format!("<script>{ANIMATION_SCRIPT}</script>")));
+        assert_eq!(page.matches("<script").count(), 1);
+        // All frames but the last are hidden, for readers whose browser runs no script.
+        assert_eq!(page.matches("class=\"frame\" hidden").count(), 1);
     }
 }

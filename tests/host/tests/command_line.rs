@@ -8,7 +8,14 @@ use std::time::{Duration, Instant};
 use common::{HEADER, RIG, Scratch, recording_of};
 use test_support::scenario::article;
 
-const SUBCOMMANDS: [&str; 5] = ["estimate", "fit", "simulate", "demo", "completions"];
+const SUBCOMMANDS: [&str; 6] = [
+    "estimate",
+    "fit",
+    "simulate",
+    "paper",
+    "demo",
+    "completions",
+];
 
 fn scratch() -> Scratch {
     let scratch = Scratch::with_rig(&format!("{RIG}\n[noise]\ndrag_force_n = 40.0\n"));

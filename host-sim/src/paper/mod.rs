@@ -1,0 +1,142 @@
+//! The article reproduced: R. Rudd, "Estimating the Mu Slip Curve via Extended Kalman Filtering", The
+//! Mathematica Journal 11 (2011).
+//!
+//! Its data came from a stream of random numbers that nobody else has. What it says of one stream is
+//! therefore held against thousands of streams, what it says of the equations is held against the
+//! filter of the core crate itself, and each statement gets a verdict. Beside that stands a yardstick
+//! for other estimators: errors over a grid of curves against the Cramér-Rao bound.
+//!
+//! The same options give the same figures, whatever the number of threads.
+
+mod bound;
+mod exact;
+mod figures;
+mod monte_carlo;
+mod pages;
+mod pass;
+mod statement;
+mod statistics;
+mod stream;
+mod table;
+mod yardstick;
+
+use std::ops::Range as Span;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use rayon::prelude::*;
+
+pub use bound::Bound;
+pub use exact::{
+    DirectMeasurement, direct_measurement, equal_sensitivity_slips, gradient, slip_of_extremum,
+};
+pub use figures::{NamedFigure, Part, convergence_frames, figures};
+pub use monte_carlo::{ArticleStream, Course, Regression, SecondStart};
+pub use pages::{CONVERGENCE_PAGE, article_markdown, convergence_page, report_page};
+pub use pass::{PassError, Step, first_start, second_start, traced};
+pub use statement::{Ours, Statement, Verdict};
+pub use statistics::Band;
+pub use stream::{FRICTION_STD, POINTS, TRUTH, frictions, slips};
+pub use table::Table;
+pub use yardstick::{Accuracy, Cell, Contender, Errors};
+
+/// How much is computed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct PaperOptions {
+    /// Seed of the first stream of noise; the others follow it one by one.
+    pub seed: u64,
+    /// Number of streams, at least 2.
+    pub streams: u64,
+}
+
+impl Default for PaperOptions {
+    fn default() -> Self {
+        Self {
+            seed: 1,
+            streams: 10_000,
+        }
+    }
+}
+
+impl PaperOptions {
+    /// The command that computes the same.
+    pub fn command(&self) -> String {
+        format!("muslip paper --seeds {} --seed {}", self.streams, self.seed)
+    }
+
+    /// The seeds; the numbers start again at 0 after the largest.
+    fn seeds(&self) -> impl Fn(u64) -> u64 {
+        let first = self.seed;
+        move |index| first.wrapping_add(index)
+    }
+}
+
+/// All that was computed.
+#[derive(Debug, Clone)]
+pub struct Paper {
+    /// How much.
+    pub options: PaperOptions,
+    /// The article's statements beside ours.
+    pub statements: Vec<Statement>,
+    /// How the second pass does at the article's curve, by the covariance that it starts with.
+    pub second_starts: Vec<(SecondStart, Errors)>,
+    /// Errors against the bound over the grid of curves.
+    pub yardstick: Vec<Cell>,
+}
+
+/// Units of work that [`reproduce`] tells of: streams over the article's curve and each of the grid's.
+pub fn work(options: PaperOptions) -> u64 {
+    options.streams * (1 + yardstick::grid().len() as u64)
+}
+
+/// Computes the table of statements and the yardstick, over all cores. `progress` is told how much of
+/// [`work`] is done.
+pub fn reproduce(options: PaperOptions, progress: &mut dyn FnMut(u64)) -> Paper {
+    let done = AtomicU64::new(0);
+    let mut tell = |count: u64| {
+        progress(done.fetch_add(count, Ordering::Relaxed) + count);
+    };
+    let streams = over_streams(options, ArticleStream::of, &mut tell);
+    let yardstick = yardstick::grid()
+        .into_iter()
+        .map(|case| {
+            let errors = over_streams(options, |seed| case.errors(seed), &mut tell);
+            case.summarised(&errors)
+        })
+        .collect();
+    Paper {
+        options,
+        statements: statement::all(&streams),
+        second_starts: monte_carlo::second_starts(&streams),
+        yardstick,
+    }
+}
+
+/// The article's curve alone, for those who want the streams themselves.
+pub fn article_streams(options: PaperOptions) -> Vec<ArticleStream> {
+    over_streams(options, ArticleStream::of, &mut |_| {})
+}
+
+/// The statements about these streams and about the equations.
+pub fn statements(streams: &[ArticleStream]) -> Vec<Statement> {
+    statement::all(streams)
+}
+
+/// One result a seed, in the order of the seeds whichever thread computed it.
+fn over_streams<R: Send>(
+    options: PaperOptions,
+    job: impl Fn(u64) -> R + Sync,
+    tell: &mut dyn FnMut(u64),
+) -> Vec<R> {
+    const AT_ONCE: u64 = 1000;
+    let seed = options.seeds();
+    let mut results = Vec::with_capacity(usize::try_from(options.streams).unwrap_or(0));
+    let mut next = 0;
+    while next < options.streams {
+        let span: Span<u64> = next..options.streams.min(next + AT_ONCE);
+        let seeds: Vec<u64> = span.clone().map(&seed).collect();
+        results.par_extend(seeds.into_par_iter().map(&job));
+        tell(span.end - span.start);
+        next = span.end;
+    }
+    results
+}
