@@ -99,7 +99,6 @@ pub fn seal(directory: &Path) -> Result<String> {
 }
 
 /// The sealed truth of a campaign.
-#[expect(dead_code, reason = "for the scorer")]
 pub fn truth(directory: &Path, name: &str) -> Result<Truth> {
     let path = directory.join("sealed").join(name).join("truth.json");
     let text =
@@ -211,7 +210,6 @@ fn recording(rig: &Rig, recorded: &Recorded, column: Option<&str>, with_drag: bo
 }
 
 /// One column of a comma separated file.
-#[expect(dead_code, reason = "for the scorer")]
 pub fn read_column(path: &Path, header: &str) -> Result<Vec<f64>> {
     let text =
         fs::read_to_string(path).with_context(|| format!("cannot read {}", path.display()))?;

@@ -7,19 +7,31 @@
 
 mod campaign;
 mod chain;
+#[cfg(test)]
+mod checks;
+mod contract;
 mod draw;
 mod effect;
 mod figures;
 mod files;
 mod form;
+mod judge;
 mod measure;
 mod noise;
 mod oracle;
 mod plan;
 mod rig;
+mod score;
 mod sim;
 mod strata;
+mod table;
+mod tally;
+mod tool;
+mod trial;
 mod tyre;
 
 pub use files::generate;
+pub use score::{Report, ScoreRequest, score};
 pub use strata::Request;
+pub use tool::Tool;
+pub use trial::{Trial, trial};

@@ -3,8 +3,8 @@
 use std::path::PathBuf;
 
 use anyhow::Result;
-use clap::{Parser, Subcommand};
-use sealed_trial::{Request, generate};
+use clap::{Args, Parser, Subcommand};
+use sealed_trial::{Request, ScoreRequest, Tool, Trial, generate, score, trial};
 
 /// Conceal effects in recordings, have them diagnosed, and judge.
 #[derive(Parser)]
@@ -12,6 +12,28 @@ use sealed_trial::{Request, generate};
 struct Arguments {
     #[command(subcommand)]
     command: Command,
+}
+
+#[derive(Args)]
+struct ToolArguments {
+    /// The tool under trial.
+    #[arg(long, default_value = "target/release/muslip")]
+    muslip: PathBuf,
+    /// A further argument to `muslip diagnose`, for baselines and ablations; may be repeated.
+    #[arg(long = "diagnose-argument", allow_hyphen_values = true)]
+    diagnose_arguments: Vec<String>,
+    /// Campaigns at the same time, each on one thread.
+    #[arg(long, default_value_t = 2)]
+    jobs: usize,
+}
+
+impl ToolArguments {
+    fn tool(&self) -> Tool {
+        Tool {
+            path: self.muslip.clone(),
+            diagnose_arguments: self.diagnose_arguments.clone(),
+        }
+    }
 }
 
 #[derive(Subcommand)]
@@ -36,6 +58,55 @@ enum Command {
         #[arg(long)]
         strength: Option<f64>,
     },
+    /// Have campaigns diagnosed, then open the truth and judge.
+    Score {
+        #[command(flatten)]
+        tool: ToolArguments,
+        /// Directory that `generate` wrote.
+        #[arg(long)]
+        campaigns: PathBuf,
+        /// Where the tool's answers go; beside the campaigns unless given.
+        #[arg(long)]
+        results: Option<PathBuf>,
+        /// Only these strata.
+        #[arg(long, value_delimiter = ',')]
+        stratum: Vec<String>,
+        /// Only campaigns whose name, mechanism or form holds this text (alternatives with |).
+        #[arg(long)]
+        only: Option<String>,
+        /// List failed campaigns only.
+        #[arg(long)]
+        only_failures: bool,
+        /// One line a campaign, no tables.
+        #[arg(long)]
+        terse: bool,
+        /// Judge the answers of an earlier call.
+        #[arg(long)]
+        reuse: bool,
+        /// Write everything to this file.
+        #[arg(long)]
+        out: Option<PathBuf>,
+    },
+    /// Generate from a fresh seed, score, and write the pages.
+    Run {
+        #[command(flatten)]
+        tool: ToolArguments,
+        /// Seed of every draw; development uses seeds below 1000.
+        #[arg(long, default_value_t = 20_260)]
+        seed: u64,
+        /// A few campaigns only, and no pages unless a directory is given.
+        #[arg(long)]
+        small: bool,
+        /// Scratch directory.
+        #[arg(long, default_value = "target/trial")]
+        work: PathBuf,
+        /// Directory of the pages.
+        #[arg(long)]
+        pages: Option<PathBuf>,
+        /// Write everything to this file.
+        #[arg(long)]
+        out: Option<PathBuf>,
+    },
 }
 
 fn main() -> Result<()> {
@@ -59,6 +130,56 @@ fn main() -> Result<()> {
                 .collect();
             let hash = generate(&out, &requests, seed)?;
             println!("sealed truth sha256 {hash}");
+        }
+        Command::Score {
+            tool,
+            campaigns,
+            results,
+            stratum,
+            only,
+            only_failures,
+            terse,
+            reuse,
+            out,
+        } => {
+            let report = score(&ScoreRequest {
+                tool: tool.tool(),
+                results: results.unwrap_or_else(|| campaigns.join("answers")),
+                campaigns,
+                strata: stratum,
+                only,
+                jobs: tool.jobs,
+                reuse,
+            })?;
+            print!("{}", report.lines(only_failures));
+            if !terse {
+                print!("{}", report.text());
+            }
+            if let Some(path) = out {
+                report.write(&path)?;
+            }
+        }
+        Command::Run {
+            tool,
+            seed,
+            small,
+            work,
+            pages,
+            out,
+        } => {
+            let pages = pages.or_else(|| (!small).then(|| PathBuf::from("docs/trials")));
+            let report = trial(&Trial {
+                tool: tool.tool(),
+                seed,
+                small,
+                work,
+                pages,
+                jobs: tool.jobs,
+            })?;
+            print!("{}", report.text());
+            if let Some(path) = out {
+                report.write(&path)?;
+            }
         }
     }
     Ok(())
