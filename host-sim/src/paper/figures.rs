@@ -1,6 +1,6 @@
 //! The article's figures, drawn from one stream.
 
-use muslip::filter::mu_slip::Range;
+use muslip::filter::mu_slip::{Range, State};
 
 use super::exact::{equal_sensitivity_slips, slip_of_extremum};
 use super::pass::{PassError, Step, first_start, traced};
@@ -62,6 +62,7 @@ pub fn figures(seed: u64) -> Result<Vec<NamedFigure>, PassError> {
             late_ellipses(&steps),
         ),
     ];
+    all.push(named("result", Part::Convergence, result(&steps)));
     all.extend(STILLS.iter().map(|&index| {
         let name = format!("convergence-{index:02}");
         named(&name, Part::Convergence, convergence(index, &steps).figure)
@@ -333,6 +334,50 @@ fn outline(step: &Step) -> Vec<(f64, f64)> {
     )
 }
 
+fn result(steps: &[Step]) -> Figure {
+    let state_of = |state: State<f64>| Curve {
+        peak_friction: state.peak_friction,
+        critical_slip: state.critical_slip,
+    };
+    let start = state_of(Range::Aircraft.initial_state());
+    let measured = along(steps, |step| step.fusion.measured_friction);
+    let mut figure = Figure::new(
+        "Start and end: the curve that the filter starts from, the points, what it makes of them, and the \
+         truth.",
+        slip_axis(),
+        Axis::new("friction"),
+    )
+    .with(
+        Ink::Reference,
+        "start of the filter",
+        Shape::Dashes(points_of(start)),
+    )
+    .with(Ink::Truth, "true curve", Shape::Line(points_of(TRUTH)))
+    .with(Ink::Measured, "measured", Shape::Points(measured));
+    if let Some(step) = steps.last() {
+        let curve = state_of(step.estimate.state);
+        let (peak_std, slip_std) = step.estimate.covariance.std();
+        let words = format!(
+            "{:.3} \u{b1} {peak_std:.3} at slip {:.3} \u{b1} {slip_std:.3}",
+            curve.peak_friction, curve.critical_slip
+        );
+        figure = figure
+            .with(
+                Ink::Estimate,
+                "1-sigma of the peak",
+                Shape::Outline(outline(step)),
+            )
+            .with(Ink::Estimate, "estimate", Shape::Line(points_of(curve)))
+            .with(
+                Ink::Estimate,
+                "",
+                Shape::Marker((curve.critical_slip, curve.peak_friction), String::new()),
+            );
+        figure.caption = format!("{} Peak friction {words}.", figure.caption);
+    }
+    figure
+}
+
 fn convergence(index: usize, steps: &[Step]) -> AnimationFrame {
     let measured = |range: &[Step]| {
         range
@@ -397,7 +442,7 @@ mod tests {
         names.sort();
         names.dedup();
         assert_eq!(names.len(), figures.len());
-        assert_eq!(figures.len(), 8 + STILLS.len());
+        assert_eq!(figures.len(), 9 + STILLS.len());
     }
 
     #[test]
