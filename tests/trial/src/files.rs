@@ -17,7 +17,7 @@ use sha2::{Digest, Sha256};
 
 use crate::campaign::{Campaign, Recorded, Truth, column_scale};
 use crate::draw::Draw;
-use crate::rig::{BrakeColumn, Rig};
+use crate::rig::BrakeColumn;
 use crate::strata::{Request, fulfil, orders};
 
 /// Makes and files all requested campaigns in random order; gives the hash of the sealed truth.
@@ -116,20 +116,12 @@ fn file(directory: &Path, name: &str, campaign: &Campaign) -> Result<()> {
     let truth = &campaign.truth;
     fs::write(open.join("rig.toml"), truth.rig.file())?;
     for recorded in &campaign.fit {
-        fs::write(
-            open.join(&recorded.file),
-            recording(&truth.rig, recorded, truth.column.as_deref(), true),
-        )?;
+        fs::write(open.join(&recorded.file), recording(truth, recorded, true))?;
     }
     for (recorded, told) in campaign.fresh.iter().zip(&truth.fresh) {
         fs::write(
             fresh.join(&recorded.file),
-            recording(
-                &truth.rig,
-                recorded,
-                truth.column.as_deref(),
-                told.drag_column,
-            ),
+            recording(truth, recorded, told.drag_column),
         )?;
         fs::write(sealed.join(&recorded.file), reading(recorded, truth))?;
     }
@@ -149,7 +141,12 @@ fn reading(recorded: &Recorded, truth: &Truth) -> String {
     text
 }
 
-fn recording(rig: &Rig, recorded: &Recorded, column: Option<&str>, with_drag: bool) -> String {
+/// A recording as its logger writes it: some with remarks on top, some with the columns in an
+/// order of their own.
+fn recording(truth: &Truth, recorded: &Recorded, with_drag: bool) -> String {
+    let (rig, column) = (&truth.rig, truth.column.as_deref());
+    let mut habit = Draw::new(truth.seed, &[0x1066e5]);
+    let (remarks, own_order) = (habit.chance(0.15), habit.chance(0.2));
     let written = &recorded.written;
     let s = &rig.sigmas;
     let decimals = |sigma: f64| (2.0 - sigma.log10()).ceil().clamp(0.0, 9.0) as usize;
@@ -189,6 +186,12 @@ fn recording(rig: &Rig, recorded: &Recorded, column: Option<&str>, with_drag: bo
         columns.push((name, &scaled, decimals(0.01 * span)));
     }
     let mut text = String::with_capacity(written.time.len() * columns.len() * 10);
+    if own_order {
+        columns.rotate_left(2);
+    }
+    if remarks {
+        let _ = writeln!(text, "# recorded at {} Hz", rig.rate_hz);
+    }
     text.push_str("time_s");
     for (name, _, _) in &columns {
         text.push(',');

@@ -399,6 +399,9 @@ impl Form {
                 | F::BrakeLagTwo
                 | F::BrakeLagDead
         );
+        // Without a brake column a wrong scale and a wrong mass are one and the same; half the forms
+        // leave it at that.
+        needs.brake |= matches!(self, F::GainConstant | F::MassConstant);
         needs.column = matches!(
             self,
             F::OutColumnFriction

@@ -51,7 +51,7 @@ enum Command {
         /// Campaigns of each stratum.
         #[arg(long)]
         count: usize,
-        /// Only this mechanism (single), or pairs with it.
+        /// Only this mechanism (single), pairs with it, or this form (outside).
         #[arg(long)]
         mechanism: Option<String>,
         /// Size of each effect in sigma, instead of the ladder.

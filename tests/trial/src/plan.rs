@@ -176,7 +176,7 @@ impl Style {
             loads,
             load_steps: spread && draw.chance(if needs.load_plan { 0.6 } else { 0.3 }),
             speed_sweeps: !rig.coasting && spread && draw.chance(0.5),
-            standstill: draw.chance(if needs.free_rolling { 0.6 } else { 0.25 }),
+            standstill: draw.chance(if needs.free_rolling { 0.7 } else { 0.25 }),
             smoothing_s: (2.0 / rig.rate_hz).max(draw.between(0.008, 0.03)),
         }
     }

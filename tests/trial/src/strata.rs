@@ -4,7 +4,7 @@ use anyhow::{Result, bail};
 
 use crate::campaign::{Campaign, NULL_KINDS, Order, make};
 use crate::draw::Draw;
-use crate::form::{OUTSIDE, VOCABULARY, may_pair, mechanism};
+use crate::form::{Form, OUTSIDE, VOCABULARY, may_pair, mechanism};
 
 /// Sizes of effect, in sigma RMS after the base was refitted, that single effects are ordered at.
 pub const STRENGTHS: [f64; 5] = [0.6, 1.0, 2.0, 4.0, 0.3];
@@ -87,7 +87,10 @@ pub fn orders(request: &Request, seed: u64) -> Result<Vec<Order>> {
             },
             "outside" => Order {
                 stratum: "outside".into(),
-                forms: vec![OUTSIDE[index % OUTSIDE.len()].0],
+                forms: vec![match &request.mechanism {
+                    Some(word) => outside_form(word)?,
+                    None => OUTSIDE[index % OUTSIDE.len()].0,
+                }],
                 strength: vec![strength(&mut draw, &[1.0, 2.0, 4.0])],
                 null: None,
             },
@@ -96,6 +99,15 @@ pub fn orders(request: &Request, seed: u64) -> Result<Vec<Order>> {
         out.push(order);
     }
     Ok(out)
+}
+
+/// A form outside the vocabulary by its own word.
+fn outside_form(word: &str) -> Result<Form> {
+    OUTSIDE
+        .iter()
+        .map(|entry| entry.0)
+        .find(|form| serde_json::to_value(form).is_ok_and(|value| value == word))
+        .ok_or_else(|| anyhow::anyhow!("`{word}` is no effect outside the vocabulary"))
 }
 
 /// Makes a campaign; where no rig can show an effect of that size, a weaker one or another form.
