@@ -22,7 +22,8 @@ const ABOUT_VERDICTS: &str = "The article shows one stream of random noise, whic
     give a smaller figure. Statements about equations are asked of the filter itself.";
 
 const ABOUT_YARDSTICK: &str = "Root mean square errors, with the standard error of their last digits \
-    in brackets, their ratio to the Cramér-Rao bound of the 41 points, and mean errors. The bound holds for estimators without bias and \
+    in brackets, their ratio to the Cramér-Rao bound of the 41 points, and mean errors, whose \
+    standard error is at most the RMSE over the root of the number of streams. The bound holds for estimators without bias and \
     without a prior; the filter has both. Filter and fit start at the article's high end for aircraft \
     (0.6, 0.2) where peak friction is at most 0.6, and at that for cars (1.0, 0.2) where it is 1.0. The \
     second pass runs over the same points again, from the state that the first ended with, each standard \
@@ -181,8 +182,16 @@ pub fn article_markdown(paper: &Paper) -> String {
 }
 
 fn table_block(table: Table) -> Block {
+    // Verdicts, names and figures stay on one line; longer text may break.
+    let unbroken = |cell: String| match cell.len() {
+        ..=16 => cell.replace(' ', "\u{a0}"),
+        _ => cell,
+    };
+    let rows = table.rows.into_iter();
     Block::Table {
         head: table.head,
-        rows: table.rows,
+        rows: rows
+            .map(|row| row.into_iter().map(unbroken).collect())
+            .collect(),
     }
 }

@@ -1,6 +1,5 @@
 //! The tables, for a terminal, for Markdown and for programs.
 
-use muslip::filter::mu_slip::Range;
 use serde_json::{Value, json};
 
 use super::statement::{Ours, Statement};
@@ -111,7 +110,6 @@ impl Paper {
                 let mut row = vec![
                     format!("{:.2}", cell.truth.peak_friction),
                     format!("{:.2}", cell.truth.critical_slip),
-                    range_word(cell.range).to_owned(),
                     who.to_owned(),
                 ];
                 row.extend(figures);
@@ -134,7 +132,6 @@ impl Paper {
             head: owned([
                 "mup",
                 "sp",
-                "start",
                 "estimator",
                 "RMSE mup",
                 "/bound",
@@ -290,10 +287,7 @@ fn cell_json(cell: &Cell) -> Value {
     json!({
         "peak_friction": cell.truth.peak_friction,
         "critical_slip": cell.truth.critical_slip,
-        "start": match cell.range {
-            Range::Aircraft => "aircraft",
-            Range::Automotive => "automotive",
-        },
+        "start": range_word(cell.range),
         "estimators": estimators,
     })
 }
