@@ -5,6 +5,7 @@
 //! crate depends on no other member of the workspace: it knows the tool by its files alone.
 #![forbid(unsafe_code)]
 
+mod baseline;
 mod campaign;
 mod chain;
 #[cfg(test)]

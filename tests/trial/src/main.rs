@@ -80,6 +80,9 @@ enum Command {
         /// One line a campaign, no tables.
         #[arg(long)]
         terse: bool,
+        /// Apply the textbook baselines to the same files as well.
+        #[arg(long)]
+        baselines: bool,
         /// Judge the answers of an earlier call.
         #[arg(long)]
         reuse: bool,
@@ -139,6 +142,7 @@ fn main() -> Result<()> {
             only,
             only_failures,
             terse,
+            baselines,
             reuse,
             out,
         } => {
@@ -149,6 +153,7 @@ fn main() -> Result<()> {
                 strata: stratum,
                 only,
                 jobs: tool.jobs,
+                baselines,
                 reuse,
             })?;
             print!("{}", report.lines(only_failures));

@@ -7,6 +7,8 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use anyhow::{Context, Result, bail};
 use rayon::prelude::*;
 
+use crate::baseline::{Verdicts, verdicts};
+use crate::campaign::Truth;
 use crate::files::{names, seal, truth};
 use crate::judge::{Case, judge};
 use crate::tally;
@@ -27,6 +29,8 @@ pub struct ScoreRequest {
     pub only: Option<String>,
     /// Campaigns at the same time.
     pub jobs: usize,
+    /// Apply the textbook baselines to the same files as well.
+    pub baselines: bool,
     /// Judge the answers of an earlier call instead of calling the tool.
     pub reuse: bool,
 }
@@ -34,8 +38,8 @@ pub struct ScoreRequest {
 /// The judged trial.
 #[derive(Clone, Debug)]
 pub struct Report {
-    /// Every campaign, judged.
-    pub cases: Vec<Case>,
+    pub(crate) cases: Vec<Case>,
+    baselines: Vec<(Truth, Verdicts)>,
 }
 
 /// Has every campaign diagnosed, then opens the truth and judges.
@@ -107,7 +111,18 @@ pub fn score(request: &ScoreRequest) -> Result<Report> {
             )
         })
         .collect::<Result<Vec<_>>>()?;
-    Ok(Report { cases })
+    let baselines = if request.baselines {
+        answers
+            .par_iter()
+            .map(|(name, _)| {
+                let truth = truth(&request.campaigns, name)?;
+                verdicts(&request.campaigns, &truth).map(|verdicts| (truth, verdicts))
+            })
+            .collect::<Result<Vec<_>>>()?
+    } else {
+        Vec::new()
+    };
+    Ok(Report { cases, baselines })
 }
 
 impl Report {
@@ -143,6 +158,9 @@ impl Report {
             text.push_str(&case.line());
             text.push('\n');
         }
+        if !self.baselines.is_empty() {
+            text.push_str(&tally::baselines(cases, &self.baselines).text());
+        }
         text.push_str(&tally::bars(cases).text());
         text
     }
@@ -162,6 +180,9 @@ impl Report {
             tally::figures(cases, 20),
         ] {
             text.push_str(&table.markdown());
+        }
+        if !self.baselines.is_empty() {
+            text.push_str(&tally::baselines(cases, &self.baselines).markdown());
         }
         text.push_str("## The twenty worst cases\n\n```text\n");
         for case in tally::worst(cases, 20) {

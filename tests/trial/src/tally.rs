@@ -4,6 +4,8 @@ use std::collections::BTreeMap;
 
 use statrs::distribution::{Beta, ContinuousCDF};
 
+use crate::baseline::Verdicts;
+use crate::campaign::Truth;
 use crate::form::{OUTSIDE, VOCABULARY};
 use crate::judge::{BAR_STRENGTH, Case};
 use crate::table::Table;
@@ -541,6 +543,109 @@ pub fn confusion(cases: &[Case]) -> Table {
         columns.len() - 1,
         columns.len()
     ));
+    table
+}
+
+/// The tool beside textbook methods on the same files.
+pub fn baselines(cases: &[Case], verdicts: &[(Truth, Verdicts)]) -> Table {
+    let mut table = Table::new(
+        "Baselines on the same files",
+        &[
+            "method",
+            "false alarms",
+            "right first, single from 0.6 sigma",
+            "pairs, F1",
+            "outside: says so",
+        ],
+    );
+    let share = |share: Share| {
+        if share.of == 0 {
+            "-".to_owned()
+        } else {
+            percent(share.value())
+        }
+    };
+    let number = |values: &[f64]| {
+        if values.is_empty() {
+            "-".to_owned()
+        } else {
+            format!("{:.2}", mean(values).0)
+        }
+    };
+    let f1: Vec<f64> = of(cases, "pair").map(|case| case.f1).collect();
+    table.row([
+        "muslip diagnose".to_owned(),
+        share(Share::count(of(cases, "null"), |case| {
+            case.verdict != "consistent"
+        })),
+        share(Share::count(strong(cases), |case| case.first_right)),
+        number(&f1),
+        share(Share::count(of(cases, "outside"), |case| case.honest)),
+    ]);
+    let stratum = |name: &'static str| verdicts.iter().filter(move |pair| pair.0.stratum == name);
+    let single = || {
+        stratum("single").filter(|pair| {
+            pair.0
+                .concealed
+                .iter()
+                .all(|concealed| concealed.effect.strength_sigma >= BAR_STRENGTH)
+        })
+    };
+    let right = |truth: &Truth, id: Option<&str>| {
+        id.is_some_and(|id| {
+            truth
+                .concealed
+                .iter()
+                .any(|concealed| concealed.accept.iter().any(|name| name == id))
+        })
+    };
+    let overlap = |truth: &Truth, named: &[&str]| {
+        let hits = truth
+            .concealed
+            .iter()
+            .filter(|concealed| {
+                named
+                    .iter()
+                    .any(|id| concealed.accept.iter().any(|name| name == id))
+            })
+            .count();
+        2.0 * hits as f64 / (named.len() + truth.concealed.len()) as f64
+    };
+    let pairs: Vec<f64> = stratum("pair")
+        .map(|(truth, verdict)| overlap(truth, &verdict.selected))
+        .collect();
+    table.row([
+        "white-noise BIC, forward".to_owned(),
+        share(Share::count(stratum("null"), |pair| {
+            !pair.1.selected.is_empty()
+        })),
+        share(Share::count(single(), |pair| {
+            right(&pair.0, pair.1.selected.first().copied())
+        })),
+        number(&pairs),
+        "never".to_owned(),
+    ]);
+    let pairs: Vec<f64> = stratum("pair")
+        .map(|(truth, verdict)| overlap(truth, &[verdict.best_single]))
+        .collect();
+    table.row([
+        "best single by training error".to_owned(),
+        share(Share::count(stratum("null"), |pair| {
+            !pair.1.best_single.is_empty()
+        })),
+        share(Share::count(single(), |pair| {
+            right(&pair.0, Some(pair.1.best_single))
+        })),
+        number(&pairs),
+        "never".to_owned(),
+    ]);
+    table.row([
+        "residual whiteness alone".to_owned(),
+        share(Share::count(stratum("null"), |pair| !pair.1.white)),
+        "names nothing".to_owned(),
+        "-".to_owned(),
+        share(Share::count(stratum("outside"), |pair| !pair.1.white)),
+    ]);
     table
 }
 

@@ -68,6 +68,7 @@ pub fn trial(trial: &Trial) -> Result<Report> {
         campaigns,
         strata: vec![],
         only: None,
+        baselines: true,
         jobs: trial.jobs,
         reuse: false,
     })?;

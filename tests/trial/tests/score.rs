@@ -154,6 +154,7 @@ fn judged(directory: &Path, knowing: bool) -> Report {
         }),
         strata: vec![],
         only: None,
+        baselines: false,
         jobs: 2,
         reuse: false,
     })
@@ -194,6 +195,7 @@ fn a_broken_seal_is_noticed() {
         results: directory.path().join("answers"),
         strata: vec![],
         only: None,
+        baselines: false,
         jobs: 2,
         reuse: false,
     };
