@@ -97,6 +97,7 @@
     )
 )]
 
+pub mod compensate;
 pub mod filter;
 pub mod law;
 pub mod real;

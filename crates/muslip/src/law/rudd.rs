@@ -42,7 +42,43 @@ impl<T: Real> TryFrom<Unchecked<T>> for Rudd<T> {
     }
 }
 
-/// The law and the derivatives that the filter needs, at one slip.
+/// Friction and its derivatives in the two parameters, at one slip: what a filter needs of a law.
+///
+/// [`Rudd::expansion`] makes one of the law itself. What stands between the law and a reading (a
+/// low-pass filter, say) may change the five numbers alike: they are then those of the reading expected.
+/// ∂²mu/∂mup² is zero. All dimensionless.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Expansion<T> {
+    /// Friction mu.
+    pub friction: T,
+    /// ∂mu/∂mup.
+    pub by_peak_friction: T,
+    /// ∂mu/∂sp.
+    pub by_critical_slip: T,
+    /// ∂²mu/∂mup∂sp.
+    pub by_both: T,
+    /// ∂²mu/∂sp².
+    pub by_critical_slip_twice: T,
+}
+
+impl<T: Real> Expansion<T> {
+    /// True where all five are finite.
+    pub fn is_finite(&self) -> bool {
+        [
+            self.friction,
+            self.by_peak_friction,
+            self.by_critical_slip,
+            self.by_both,
+            self.by_critical_slip_twice,
+        ]
+        .into_iter()
+        .all(T::is_finite)
+    }
+}
+
+/// The law and its derivatives at one slip.
 ///
 /// Two divisions fewer than evaluating each by its textbook form: with w = 1/(sp² + s²),
 ///
@@ -54,17 +90,7 @@ impl<T: Real> TryFrom<Unchecked<T>> for Rudd<T> {
 /// ∂²mu/∂sp²     = 2 mu (sp² - 3 s²) w²
 /// ```
 ///
-/// (∂²mu/∂mup² is zero). Nothing is validated here: the filter's state may pass through values that
-/// are no tyre.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Expansion<T> {
-    pub friction: T,
-    pub by_peak_friction: T,
-    pub by_critical_slip: T,
-    pub by_both: T,
-    pub by_critical_slip_twice: T,
-}
-
+/// Nothing is validated here: the filter's state may pass through values that are no tyre.
 #[inline(always)]
 pub(crate) fn expand<T: Real>(peak_friction: T, critical_slip: T, slip_ratio: T) -> Expansion<T> {
     let sp2 = critical_slip * critical_slip;
@@ -115,7 +141,8 @@ impl<T: Real> Rudd<T> {
         self.critical_slip
     }
 
-    fn expand(&self, slip_ratio: T) -> Expansion<T> {
+    /// Friction and its derivatives at a slip.
+    pub fn expansion(&self, slip_ratio: T) -> Expansion<T> {
         expand(self.peak_friction, self.critical_slip, slip_ratio)
     }
 }
@@ -133,7 +160,7 @@ impl<T: Real> TyreLaw<T, 2> for Rudd<T> {
     }
 
     fn friction(&self, slip_ratio: T) -> T {
-        self.expand(slip_ratio).friction
+        self.expansion(slip_ratio).friction
     }
 
     /// By the symmetry of the law in s and sp: 2 mup sp (sp² - s²) / (sp² + s²)².
@@ -145,12 +172,12 @@ impl<T: Real> TyreLaw<T, 2> for Rudd<T> {
     }
 
     fn gradient(&self, slip_ratio: T) -> SVector<T, 2> {
-        let e = self.expand(slip_ratio);
+        let e = self.expansion(slip_ratio);
         SVector::<T, 2>::new(e.by_peak_friction, e.by_critical_slip)
     }
 
     fn hessian(&self, slip_ratio: T) -> SMatrix<T, 2, 2> {
-        let e = self.expand(slip_ratio);
+        let e = self.expansion(slip_ratio);
         SMatrix::<T, 2, 2>::new(T::ZERO, e.by_both, e.by_both, e.by_critical_slip_twice)
     }
 

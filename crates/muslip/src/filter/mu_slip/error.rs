@@ -16,6 +16,8 @@ pub enum Input {
     Friction,
     /// The variance (or standard deviation) of the measured friction.
     Noise,
+    /// The friction expected, or one of its derivatives.
+    Expected,
 }
 
 /// Why an update was refused. State and covariance are what they were before.
@@ -71,6 +73,7 @@ impl fmt::Display for Input {
             Self::SlipRatio => "slip ratio",
             Self::Friction => "friction",
             Self::Noise => "measurement noise",
+            Self::Expected => "expected friction",
         })
     }
 }

@@ -3,6 +3,7 @@ use super::error::{Input, UpdateError};
 use super::state::{Covariance, Estimate, State};
 use super::update::{Choices, Decision, Fusion, Inputs};
 use crate::filter::{Estimator, FrictionMeasurement, PeakEstimate};
+use crate::law::rudd::{self, Expansion};
 use crate::real::Real;
 
 /// The filter: a validated configuration and the present estimate.
@@ -44,6 +45,59 @@ impl<T: Real> MuSlipFilter<T> {
         };
     }
 
+    /// Corrects the estimate with a measurement that does not read the law at its slip but something made
+    /// of it, which `expected` predicts at the present state; or rejects it at the gate.
+    ///
+    /// [`Compensator::step`](crate::compensate::Compensator::step) makes both arguments. The slip is
+    /// reported and not computed with. With the law's own expansion it is [`Estimator::update`], bit for
+    /// bit.
+    ///
+    /// # Errors
+    /// [`UpdateError`]; the estimate is exactly as it was before the call.
+    pub fn update_expecting(
+        &mut self,
+        measurement: &FrictionMeasurement<T>,
+        expected: Expansion<T>,
+    ) -> Result<Fusion<T>, UpdateError> {
+        if !expected.is_finite() {
+            return Err(UpdateError::NonFinite(Input::Expected));
+        }
+        self.fuse(measurement, expected)
+    }
+
+    #[inline(always)]
+    fn fuse(
+        &mut self,
+        measurement: &FrictionMeasurement<T>,
+        expected: Expansion<T>,
+    ) -> Result<Fusion<T>, UpdateError> {
+        // The square below would hide the sign.
+        if measurement.friction_std <= T::ZERO {
+            return Err(UpdateError::NonPositiveNoise);
+        }
+        let inflated_std = self.config.noise_inflation * measurement.friction_std;
+        let inputs = Inputs {
+            state: self.estimate.state,
+            covariance: self.estimate.covariance,
+            slip_ratio: measurement.slip_ratio,
+            expected,
+            friction: measurement.friction,
+            measurement_variance: inflated_std * inflated_std,
+        };
+        let step = inputs.judged(inputs.step(self.choices()))?;
+        let mut fusion = step.fusion;
+        if self.config.nis_gate.is_some_and(|gate| fusion.nis > gate) {
+            fusion.decision = Decision::Rejected;
+            fusion.signal_after = fusion.signal_before;
+        } else {
+            self.estimate = Estimate {
+                state: step.state,
+                covariance: step.covariance,
+            };
+        }
+        Ok(fusion)
+    }
+
     fn choices(&self) -> Choices {
         Choices {
             pseudonoise: self.config.pseudonoise,
@@ -63,30 +117,12 @@ impl<T: Real> Estimator<T> for MuSlipFilter<T> {
     /// # Errors
     /// [`UpdateError`]; the estimate is exactly as it was before the call.
     fn update(&mut self, measurement: &FrictionMeasurement<T>) -> Result<Fusion<T>, UpdateError> {
-        // The square below would hide the sign.
-        if measurement.friction_std <= T::ZERO {
-            return Err(UpdateError::NonPositiveNoise);
-        }
-        let inflated_std = self.config.noise_inflation * measurement.friction_std;
-        let inputs = Inputs {
-            state: self.estimate.state,
-            covariance: self.estimate.covariance,
-            slip_ratio: measurement.slip_ratio,
-            friction: measurement.friction,
-            measurement_variance: inflated_std * inflated_std,
-        };
-        let step = inputs.judged(inputs.step(self.choices()))?;
-        let mut fusion = step.fusion;
-        if self.config.nis_gate.is_some_and(|gate| fusion.nis > gate) {
-            fusion.decision = Decision::Rejected;
-            fusion.signal_after = fusion.signal_before;
-        } else {
-            self.estimate = Estimate {
-                state: step.state,
-                covariance: step.covariance,
-            };
-        }
-        Ok(fusion)
+        let State {
+            peak_friction,
+            critical_slip,
+        } = self.estimate.state;
+        let expected = rudd::expand(peak_friction, critical_slip, measurement.slip_ratio);
+        self.fuse(measurement, expected)
     }
 
     fn estimate(&self) -> Estimate<T> {

@@ -18,9 +18,10 @@
 //! the standard deviations of P's diagonal (and a correlation of 1 for the cross term; the mup-mup term
 //! is zero). They keep the filter from trusting a linearisation that its own uncertainty exceeds.
 //!
-//! Three ways in, one arithmetic: [`update`] (lean, for the loop of a controller), [`update_reporting`]
-//! (the same with innovation, noise and gain), and [`MuSlipFilter`], which adds configuration, an
-//! optional gate and the [`Estimator`](crate::filter::Estimator) trait.
+//! Four ways in, one arithmetic: [`update`] (lean, for the loop of a controller), [`update_reporting`]
+//! (the same with innovation, noise and gain), [`update_expecting`] (for a measurement that reads
+//! something made of the law, see [`compensate`](crate::compensate)), and [`MuSlipFilter`], which adds
+//! configuration, an optional gate and the [`Estimator`](crate::filter::Estimator) trait.
 //!
 //! The filter does not hold the state to positive values, as the article's does not: one bad
 //! measurement may carry it through zero and later ones bring it back. [`State::is_physical`] tells.
@@ -35,4 +36,4 @@ pub use config::{Config, CovarianceForm, Range};
 pub use error::{ConfigError, ConfigParameter, Input, UpdateError};
 pub use filter::MuSlipFilter;
 pub use state::{Covariance, Estimate, State};
-pub use update::{Decision, Fusion, update, update_reporting};
+pub use update::{Decision, Fusion, update, update_expecting, update_reporting};

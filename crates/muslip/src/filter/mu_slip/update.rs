@@ -3,7 +3,7 @@
 use super::config::CovarianceForm;
 use super::error::{Input, UpdateError};
 use super::state::{Covariance, Estimate, State};
-use crate::law::rudd;
+use crate::law::rudd::{self, Expansion};
 use crate::real::Real;
 
 /// Whether a measurement changed the estimate.
@@ -78,12 +78,33 @@ pub(super) struct Inputs<T> {
     pub state: State<T>,
     pub covariance: Covariance<T>,
     pub slip_ratio: T,
+    /// The reading expected at `state`.
+    pub expected: Expansion<T>,
     pub friction: T,
     /// (n σ)²
     pub measurement_variance: T,
 }
 
 impl<T: Real> Inputs<T> {
+    /// A measurement that reads the law itself at a slip.
+    #[inline(always)]
+    pub(super) fn of_the_law(
+        state: State<T>,
+        covariance: Covariance<T>,
+        slip_ratio: T,
+        friction: T,
+        measurement_variance: T,
+    ) -> Self {
+        Self {
+            state,
+            covariance,
+            slip_ratio,
+            expected: rudd::expand(state.peak_friction, state.critical_slip, slip_ratio),
+            friction,
+            measurement_variance,
+        }
+    }
+
     /// The equations of the module, unrolled. Two divisions, no calls.
     #[inline(always)]
     pub(super) fn step(&self, choices: Choices) -> Step<T> {
@@ -92,7 +113,7 @@ impl<T: Real> Inputs<T> {
             critical_slip,
         } = self.state;
         let Covariance { p00, p01, p11 } = self.covariance;
-        let law = rudd::expand(peak_friction, critical_slip, self.slip_ratio);
+        let law = self.expected;
         let (h0, h1) = (law.by_peak_friction, law.by_critical_slip);
 
         let pseudonoise = if choices.pseudonoise {
@@ -242,13 +263,13 @@ pub fn update<T: Real>(
     friction: T,
     measurement_variance: T,
 ) -> Result<(State<T>, Covariance<T>), UpdateError> {
-    let inputs = Inputs {
+    let inputs = Inputs::of_the_law(
         state,
         covariance,
         slip_ratio,
         friction,
         measurement_variance,
-    };
+    );
     let step = inputs.judged(inputs.step(ARTICLE))?;
     Ok((step.state, step.covariance))
 }
@@ -265,10 +286,46 @@ pub fn update_reporting<T: Real>(
     friction: T,
     measurement_variance: T,
 ) -> Result<(Estimate<T>, Fusion<T>), UpdateError> {
+    let inputs = Inputs::of_the_law(
+        state,
+        covariance,
+        slip_ratio,
+        friction,
+        measurement_variance,
+    );
+    let step = inputs.judged(inputs.step(ARTICLE))?;
+    let estimate = Estimate {
+        state: step.state,
+        covariance: step.covariance,
+    };
+    Ok((estimate, step.fusion))
+}
+
+/// [`update_reporting`] of a measurement that does not read the law at its slip but something made of it
+/// (behind a low-pass filter, say), which `expected` predicts at the prior state.
+///
+/// `slip_ratio` is reported and not computed with. With [`Rudd::expansion`](crate::law::Rudd::expansion)
+/// of the prior state it is [`update_reporting`], bit for bit.
+///
+/// # Errors
+/// As for [`update`]; [`UpdateError::NonFinite`] of [`Input::Expected`] if `expected` is not finite.
+#[inline]
+pub fn update_expecting<T: Real>(
+    state: State<T>,
+    covariance: Covariance<T>,
+    slip_ratio: T,
+    expected: Expansion<T>,
+    friction: T,
+    measurement_variance: T,
+) -> Result<(Estimate<T>, Fusion<T>), UpdateError> {
+    if !expected.is_finite() {
+        return Err(UpdateError::NonFinite(Input::Expected));
+    }
     let inputs = Inputs {
         state,
         covariance,
         slip_ratio,
+        expected,
         friction,
         measurement_variance,
     };
