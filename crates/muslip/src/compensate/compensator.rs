@@ -12,6 +12,9 @@ use crate::sample::{Channel, RigSample, SampleError, SampleLimits, SlipFriction,
 /// The smallest factor on friction that is compensated: beyond, a model says more than a reading can.
 const SMALLEST_FACTOR: f64 = 0.02;
 
+/// Friction beyond which a reading is no tyre's: it heats no tread.
+const LARGEST_FRICTION: f64 = 3.0;
+
 /// Slowest speed in m/s at which slip and force still relax: below it the tyre would never settle.
 const SLOWEST_RELAXATION_M_S: f64 = 0.05;
 
@@ -327,8 +330,10 @@ impl<T: Real, const N: usize> Compensator<T, N> {
 
         if let Some(thermal) = effects.thermal_fade {
             memory.temperature_s = thermal.warmed(memory.temperature_s, memory.power_w, dt_s);
+            // An outlier of the load cell must not set the tread on fire.
+            let most_n = T::from_f64(LARGEST_FRICTION) * fz;
             memory.power_w = if rolling {
-                drag_n * sliding_m_s
+                drag_n.max(-most_n).min(most_n) * sliding_m_s
             } else {
                 T::ZERO
             };
