@@ -103,6 +103,27 @@ pub enum InputProblem {
     /// Every row was read, and none can serve as a measurement.
     #[error("no usable sample: {0}")]
     NoUsableSample(String),
+    /// A recording given more than once.
+    #[error("given twice: the same file as {0}")]
+    GivenTwice(String),
+    /// A model file whose content this program cannot run.
+    #[error("{key}: {what}")]
+    Model {
+        /// Key with its tables, as in `tyre[0].id`.
+        key: String,
+        /// What is wrong with it.
+        what: String,
+    },
+    /// A rig file that is not that of the model.
+    #[error("{key} = {found}: the model was made for a rig with {expected}")]
+    OtherRig {
+        /// Key with its table, as in `wheel.radius_m`.
+        key: &'static str,
+        /// The rig file's value.
+        found: String,
+        /// The model's value.
+        expected: String,
+    },
     /// The usable samples do not hold a curve.
     #[error("no curve: {0}")]
     NoCurve(String),

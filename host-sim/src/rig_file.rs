@@ -86,15 +86,7 @@ impl RigFile {
     /// # Errors
     /// As [`RigFile::read`].
     pub fn parse(path: &Path, bytes: &[u8]) -> Result<Self, InputError> {
-        let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
-        let text = match str::from_utf8(bytes) {
-            Ok(text) => text,
-            Err(error) => {
-                let valid = &bytes[..error.valid_up_to()];
-                let text = String::from_utf8_lossy(valid);
-                return Err(error_at(path, &text, text.len(), InputProblem::NotUtf8));
-            }
-        };
+        let text = text_of(path, bytes)?;
         let fail = |at, problem| error_at(path, text, at, problem);
         let written: Written = toml::from_str(text).map_err(|error| {
             fail(
@@ -209,7 +201,17 @@ impl Written {
     }
 }
 
-fn error_at(path: &Path, text: &str, byte: usize, problem: InputProblem) -> InputError {
+/// The text of a file without its byte order mark.
+pub(crate) fn text_of<'a>(path: &Path, bytes: &'a [u8]) -> Result<&'a str, InputError> {
+    let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
+    str::from_utf8(bytes).map_err(|error| {
+        let valid = String::from_utf8_lossy(&bytes[..error.valid_up_to()]);
+        error_at(path, &valid, valid.len(), InputProblem::NotUtf8)
+    })
+}
+
+/// A problem at a byte of a file's text.
+pub(crate) fn error_at(path: &Path, text: &str, byte: usize, problem: InputProblem) -> InputError {
     let before = text.get(..byte).unwrap_or(text);
     let line_start = before.rfind('\n').map_or(0, |newline| newline + 1);
     InputError {

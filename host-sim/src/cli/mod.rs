@@ -5,9 +5,11 @@
 
 mod completions;
 mod demo;
+mod diagnose;
 mod estimate;
 mod fit;
 mod paper;
+mod predict;
 mod progress;
 mod simulate;
 mod terminal;
@@ -41,6 +43,8 @@ struct Arguments {
 enum Command {
     Estimate(estimate::Arguments),
     Fit(fit::Arguments),
+    Diagnose(diagnose::Arguments),
+    Predict(predict::Arguments),
     Simulate(simulate::Arguments),
     Paper(paper::Arguments),
     Demo(demo::Arguments),
@@ -96,6 +100,8 @@ pub fn main() -> ExitCode {
     let outcome = match arguments.command {
         Command::Estimate(arguments) => estimate::run(&arguments, &mut terminal),
         Command::Fit(arguments) => fit::run(&arguments, &mut terminal),
+        Command::Diagnose(arguments) => diagnose::run(&arguments, &mut terminal),
+        Command::Predict(arguments) => predict::run(&arguments, &mut terminal),
         Command::Simulate(arguments) => simulate::run(&arguments, &mut terminal),
         Command::Paper(arguments) => paper::run(&arguments, &mut terminal),
         Command::Demo(arguments) => demo::run(&arguments, &mut terminal),

@@ -47,6 +47,13 @@ impl Progress {
             self.bar.set_position(units);
         }
     }
+
+    /// Tells what is being done.
+    pub(super) fn says(&mut self, what: &str) {
+        if self.possible && self.bar.message() != what {
+            self.bar.set_message(what.to_owned());
+        }
+    }
 }
 
 impl Drop for Progress {

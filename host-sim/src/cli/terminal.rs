@@ -2,7 +2,7 @@
 
 use std::io::{self, IsTerminal, Write};
 
-use clap::builder::styling::Style;
+use clap::builder::styling::{AnsiColor, Style};
 
 use super::Failure;
 
@@ -30,6 +30,17 @@ impl Terminal {
     pub(super) fn headline(&mut self, text: &str) -> Result<(), Failure> {
         let bold = Style::new().bold();
         writeln!(self.out, "{bold}{text}{bold:#}").map_err(Failure::Terminal)
+    }
+
+    /// Prints a verdict: a line in bold, and in the colour of what it means.
+    pub(super) fn verdict(&mut self, text: &str, good: bool) -> Result<(), Failure> {
+        let color = if good {
+            AnsiColor::Green
+        } else {
+            AnsiColor::Yellow
+        };
+        let style = Style::new().bold().fg_color(Some(color.into()));
+        writeln!(self.out, "{style}{text}{style:#}").map_err(Failure::Terminal)
     }
 
     /// Prints running text, wrapped.

@@ -1,3 +1,12 @@
-//! `muslip diagnose`, `muslip predict`: files in, engine, files out.
+//! `muslip diagnose` and `muslip predict`: files in, engine, files out.
 
+pub mod job;
+pub mod json;
 pub mod load;
+pub mod model_file;
+pub mod optional;
+pub mod page;
+pub mod plots;
+pub mod predict;
+pub mod summary;
+pub mod wording;

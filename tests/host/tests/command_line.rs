@@ -8,9 +8,11 @@ use std::time::{Duration, Instant};
 use common::{HEADER, RIG, Scratch, recording_of};
 use test_support::scenario::article;
 
-const SUBCOMMANDS: [&str; 6] = [
+const SUBCOMMANDS: [&str; 8] = [
     "estimate",
     "fit",
+    "diagnose",
+    "predict",
     "simulate",
     "paper",
     "demo",

@@ -1,0 +1,87 @@
+//! The whole of `muslip diagnose`: read everything, run the engine, write three files together.
+
+use std::io::Write as _;
+use std::path::Path;
+
+use muslip_diagnose::diagnose::diagnose;
+use muslip_diagnose::outcome::{Diagnosis, Fault};
+
+use super::load::Campaign;
+use super::wording::verdict_sentence;
+use super::{json, model_file, page};
+use crate::output::{OutputError, OutputFile, create_folder};
+use crate::report::ReportError;
+
+/// Names of the files, in the order in which they appear.
+pub const FILES: [&str; 3] = ["diagnosis.json", "model.toml", "report.html"];
+
+/// Files that could not be made.
+#[derive(Debug, thiserror::Error)]
+pub enum WriteError {
+    /// The folder or a file cannot be written.
+    #[error(transparent)]
+    Output(#[from] OutputError),
+    /// The report could not be drawn.
+    #[error(transparent)]
+    Report(#[from] ReportError),
+    /// The diagnosis could not be put into words for machines.
+    #[error("the diagnosis could not be written as text: {0}")]
+    Text(String),
+}
+
+/// Runs the engine on a campaign. The recordings are given up, so that they need not lie in memory any
+/// longer than the engine needs them. What had to be mended to read them joins the faults of the data.
+#[must_use]
+pub fn run(campaign: Campaign, progress: &(dyn Fn(f64, &str) + Sync)) -> Diagnosis {
+    let Campaign { rig, runs, faults } = campaign;
+    let mut diagnosis = diagnose(&rig, &runs, progress);
+    drop(runs);
+    add_faults(&mut diagnosis, faults);
+    json::make_finite(&mut diagnosis);
+    diagnosis
+}
+
+/// Faults of reading stand before those of content.
+fn add_faults(diagnosis: &mut Diagnosis, mut faults: Vec<Fault>) {
+    faults.append(&mut diagnosis.data_faults);
+    diagnosis.data_faults = faults;
+}
+
+/// Makes the folder, and finds out whether it can be written, before the work is done.
+///
+/// # Errors
+/// [`OutputError`] naming the folder or the file.
+pub fn prepare_folder(out: &Path) -> Result<(), OutputError> {
+    create_folder(out)?;
+    for name in FILES {
+        // Dropped without a commit, it leaves no trace.
+        drop(OutputFile::create(&out.join(name))?);
+    }
+    Ok(())
+}
+
+/// Writes the files of a diagnosis: all of them are complete before the first takes its name. `command`
+/// is what made them. Returns the text of `diagnosis.json`.
+///
+/// # Errors
+/// [`WriteError`]; files that were there before are then still what they were.
+pub fn write(out: &Path, diagnosis: &Diagnosis, command: &str) -> Result<String, WriteError> {
+    let text = json::to_text(diagnosis).map_err(|error| WriteError::Text(error.to_string()))?;
+    let model = model_file::to_text(&diagnosis.repaired, &verdict_sentence(diagnosis))
+        .map_err(|error| WriteError::Text(error.to_string()))?;
+    let report = page::report(diagnosis, command).to_html()?;
+    create_folder(out)?;
+    let mut files = Vec::with_capacity(FILES.len());
+    for (name, contents) in FILES.into_iter().zip([&text, &model, &report]) {
+        let path = out.join(name);
+        let mut file = OutputFile::create(&path)?;
+        file.write_all(contents.as_bytes())
+            .and_then(|()| file.flush())
+            .map_err(|error| OutputError::new(&path, error))?;
+        files.push(file);
+    }
+    for file in files {
+        file.commit()?;
+    }
+    Ok(text)
+}

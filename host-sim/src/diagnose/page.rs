@@ -1,0 +1,490 @@
+//! The report of a diagnosis: `report.html`.
+
+use muslip_diagnose::mechanism::Id;
+use muslip_diagnose::outcome::{
+    Diagnosis, Estimate, Interval, NamedMechanism, Role, Score, Verdict,
+};
+
+use super::plots;
+use super::wording::{
+    NO_BREAK, capitalised, confusable_sentence, estimate, least, mechanism_sentence, percent,
+    quantity, quantity_apart, range, short_name, sigmas, significant, spoken, stretch,
+    unexplained_sentence, unseen, variable, verdict_sentence, with_unit,
+};
+use crate::report::{Block, KeyFigure, Report, Section, Tone};
+
+/// Most rows of the tables that grow with the recordings.
+const MOST_ROWS: usize = 24;
+
+/// The report of a diagnosis. `command` is what made it.
+#[must_use]
+pub fn report(diagnosis: &Diagnosis, command: &str) -> Report {
+    let sections = [
+        findings(diagnosis),
+        comparison(diagnosis),
+        proof(diagnosis),
+        places(diagnosis),
+        looked_for(diagnosis),
+        data(diagnosis),
+    ];
+    Report {
+        title: "Diagnosis".into(),
+        subject: subject(diagnosis),
+        verdict: verdict_sentence(diagnosis),
+        tone: match diagnosis.verdict {
+            Verdict::Consistent | Verdict::Explained => Tone::Good,
+            Verdict::PartlyExplained | Verdict::Unexplained | Verdict::Undecided => Tone::Warning,
+        },
+        key_figures: key_figures(diagnosis),
+        sections: sections
+            .into_iter()
+            .filter(|section| !section.blocks.is_empty())
+            .collect(),
+        command: command.to_owned(),
+    }
+}
+
+fn subject(diagnosis: &Diagnosis) -> String {
+    let recordings = &diagnosis.recordings;
+    let samples: usize = recordings.iter().map(|r| r.samples).sum();
+    let held_out = recordings
+        .iter()
+        .filter(|r| r.role == Role::Holdout)
+        .count();
+    let names: Vec<&str> = recordings.iter().map(|r| short_name(&r.path)).collect();
+    let names = match names.as_slice() {
+        [] => "no recording".to_owned(),
+        [one] => (*one).to_owned(),
+        [first, .., last] => format!("{} recordings ({first} to {last})", names.len()),
+    };
+    match held_out {
+        0 => format!("{names}, {samples} samples"),
+        held_out => format!("{names}, {samples} samples, {held_out} held out"),
+    }
+}
+
+fn key_figures(diagnosis: &Diagnosis) -> Vec<KeyFigure> {
+    let mut figures = Vec::new();
+    let mut key = |name: &str, value: String, remark: String| {
+        figures.push(KeyFigure {
+            name: name.into(),
+            value,
+            remark,
+        });
+    };
+    if let Some(first) = diagnosis.mechanisms.first()
+        && let Some(figure) = first.parameters.first()
+    {
+        let (value, std) = quantity_apart(figure.value, figure.std, &figure.unit);
+        key(
+            &format!(
+                "{}: {}",
+                capitalised(&spoken(first.id)),
+                spoken(&figure.name)
+            ),
+            value,
+            format!(
+                "{std} (1-sigma); confidence {}",
+                percent(first.evidence.confidence)
+            ),
+        );
+    }
+    let holdout = &diagnosis.fit.holdout;
+    if holdout.before.rmse_n > 0.0 && diagnosis.verdict != Verdict::Consistent {
+        let share = 100.0 * (holdout.after.rmse_n / holdout.before.rmse_n - 1.0);
+        key(
+            "Held-out error of the drag",
+            format!("{share:+.0} %").replace('-', "\u{2212}"),
+            format!(
+                "RMSE {} N to {} N",
+                significant(holdout.before.rmse_n, 3),
+                significant(holdout.after.rmse_n, 3)
+            ),
+        );
+    }
+    if let Some(noise) = diagnosis.noise.get("drag_force_n") {
+        let declared = match noise.declared {
+            Some(declared) => format!("1-sigma; declared {} N", significant(declared, 3)),
+            None => "1-sigma; none declared".to_owned(),
+        };
+        key(
+            "Noise of the drag",
+            format!("{} N", significant(noise.sigma, 3)),
+            declared,
+        );
+    }
+    figures
+}
+
+fn section(heading: &str, blocks: Vec<Block>) -> Section {
+    Section {
+        heading: heading.into(),
+        blocks,
+    }
+}
+
+fn table<const N: usize>(head: [&str; N], rows: Vec<[String; N]>) -> Block {
+    Block::Table {
+        head: head.map(str::to_owned).into(),
+        rows: rows.into_iter().map(Vec::from).collect(),
+    }
+}
+
+fn findings(diagnosis: &Diagnosis) -> Section {
+    let mut blocks = Vec::new();
+    for mechanism in &diagnosis.mechanisms {
+        blocks.push(Block::Paragraph(mechanism_sentence(mechanism)));
+        blocks.push(mechanism_table(mechanism));
+    }
+    for rest in &diagnosis.unexplained {
+        blocks.push(Block::Paragraph(unexplained_sentence(rest)));
+    }
+    for correction in &diagnosis.repaired.corrections {
+        if let (Some(low), Some(high)) = (correction.knots.first(), correction.knots.last()) {
+            blocks.push(Block::Paragraph(format!(
+                "The repaired model corrects the {} by a table of {} values over {}, {}; outside, the \
+                 correction fades out.",
+                spoken(&correction.acts_on),
+                correction.knots.len(),
+                variable(&correction.variable),
+                range(&correction.variable, *low, *high),
+            )));
+        }
+    }
+    if blocks.is_empty() {
+        blocks.push(Block::Paragraph(match diagnosis.verdict {
+            Verdict::Undecided => {
+                "Nothing could be compared; the faults of the data, below, say why.".to_owned()
+            }
+            _ => "Nothing. How large an effect would have been needed to be seen stands below, under \
+                  \u{201c}What was looked for\u{201d}."
+                .to_owned(),
+        }));
+    }
+    section("What is missing", blocks)
+}
+
+fn mechanism_table(mechanism: &NamedMechanism) -> Block {
+    let mut rows = vec![["equation".to_owned(), mechanism.equation.clone()]];
+    for figure in &mechanism.parameters {
+        rows.push([
+            spoken(&figure.name),
+            quantity(figure.value, figure.std, &figure.unit),
+        ]);
+    }
+    let evidence = &mechanism.evidence;
+    rows.push([
+        "evidence".to_owned(),
+        format!(
+            "BIC falls by {}; log likelihood on held-out data gains {} a sample; effect {} sigma of the noise (rms)",
+            significant(evidence.delta_bic, 3),
+            significant(evidence.holdout_nll_gain_per_sample, 2),
+            significant(mechanism.effect_sigma, 2),
+        ),
+    ]);
+    let confusable = confusable_sentence(mechanism);
+    if !confusable.is_empty() {
+        rows.push(["or".to_owned(), confusable]);
+    }
+    if !mechanism.separating_test.trim().is_empty() {
+        rows.push([
+            "to tell apart".to_owned(),
+            capitalised(mechanism.separating_test.trim()),
+        ]);
+    }
+    let name = capitalised(&spoken(mechanism.id));
+    let balance = format!("{} balance", mechanism.balance);
+    table([&name, &balance], rows)
+}
+
+fn comparison(diagnosis: &Diagnosis) -> Section {
+    let mut blocks = Vec::new();
+    let traces = plots::chosen(diagnosis);
+    for trace in &traces {
+        blocks.push(Block::Figure(plots::drag(diagnosis, trace)));
+        blocks.push(Block::Figure(plots::remainder(diagnosis, trace)));
+    }
+    if !traces.is_empty() {
+        blocks.push(Block::Figure(plots::against_slip(diagnosis)));
+    }
+    let left_out = diagnosis.traces.len().saturating_sub(traces.len());
+    if left_out > 0 {
+        blocks.push(Block::Paragraph(format!(
+            "{left_out} more recordings are not drawn against time."
+        )));
+    }
+    section("Before and after", blocks)
+}
+
+fn places(diagnosis: &Diagnosis) -> Section {
+    let mut blocks = Vec::new();
+    if !diagnosis.regions.is_empty() {
+        let rows = diagnosis
+            .regions
+            .iter()
+            .map(|region| {
+                [
+                    region.balance.to_owned(),
+                    variable(&region.variable),
+                    range(&region.variable, region.low, region.high),
+                    percent(region.share),
+                    sigmas(region.z),
+                ]
+            })
+            .collect();
+        let head = [
+            "balance",
+            "operating region",
+            "from, to",
+            "share of the mismatch",
+            "sigma",
+        ];
+        blocks.push(table(head, rows));
+    }
+    if !diagnosis.r#where.is_empty() {
+        let shown = strongest(&diagnosis.r#where);
+        let rows = shown
+            .iter()
+            .map(|interval| {
+                [
+                    short_name(&interval.recording).to_owned(),
+                    interval.balance.to_owned(),
+                    interval.channel.clone(),
+                    stretch(interval.start_s, interval.end_s),
+                    sigmas(interval.z),
+                ]
+            })
+            .collect();
+        if shown.len() < diagnosis.r#where.len() {
+            blocks.push(Block::Paragraph(format!(
+                "The {} strongest of {} flagged stretches; diagnosis.json has all.",
+                shown.len(),
+                diagnosis.r#where.len()
+            )));
+        }
+        blocks.push(table(
+            ["recording", "balance", "channel", "time", "sigma"],
+            rows,
+        ));
+    }
+    section("Where", blocks)
+}
+
+/// The strongest intervals, in the order of the list.
+fn strongest(intervals: &[Interval]) -> Vec<&Interval> {
+    let mut order: Vec<usize> = (0..intervals.len()).collect();
+    order.sort_by(|&a, &b| intervals[b].z.total_cmp(&intervals[a].z));
+    order.truncate(MOST_ROWS);
+    order.sort_unstable();
+    order.into_iter().map(|index| &intervals[index]).collect()
+}
+
+fn proof(diagnosis: &Diagnosis) -> Section {
+    let fit = &diagnosis.fit;
+    let scores = [
+        ("fitted data, base law", &fit.fit.before),
+        ("fitted data, repaired model", &fit.fit.after),
+        ("held-out data, base law", &fit.holdout.before),
+        ("held-out data, repaired model", &fit.holdout.after),
+    ];
+    let rows: Vec<_> = scores
+        .into_iter()
+        .filter(|(_, score)| **score != Score::default())
+        .map(|(name, score)| {
+            [
+                name.to_owned(),
+                format!("{} N", significant(score.rmse_n, 4)),
+                significant(score.nll_per_sample, 4),
+                score
+                    .whiteness_p
+                    .map_or_else(|| "not tested".to_owned(), probability),
+            ]
+        })
+        .collect();
+    let mut blocks = Vec::new();
+    if !rows.is_empty() {
+        blocks.push(table(
+            [
+                "drag predicted on",
+                "RMSE",
+                "negative log likelihood a sample",
+                "whiteness p",
+            ],
+            rows,
+        ));
+        let proof = if diagnosis.recordings.iter().any(|r| r.role == Role::Holdout) {
+            "Held-out recordings were seen by no parameter and no choice of mechanism."
+        } else {
+            "Held-out blocks of the recording were seen by no parameter and no choice of mechanism."
+        };
+        let whiteness = "Whiteness p: how likely chance alone leaves as much structure in the errors; a small \
+                         value means that something is left.";
+        blocks.push(Block::Paragraph(
+            if fit.holdout.before == Score::default() {
+                whiteness.to_owned()
+            } else {
+                format!("{proof} {whiteness}")
+            },
+        ));
+    }
+    let mut rows: Vec<[String; 3]> = base_in_order(diagnosis)
+        .map(|(name, value)| {
+            let (name, of) = match name.strip_prefix("repaired_") {
+                Some(name) => (name, "1-sigma, law beside the mechanisms"),
+                None => (name, "1-sigma, law alone"),
+            };
+            [spoken(name), estimate(value), of.to_owned()]
+        })
+        .collect();
+    rows.extend(diagnosis.noise.iter().map(|(channel, noise)| {
+        let declared = match noise.declared {
+            Some(declared) => format!("declared {}", significant(declared, 3)),
+            None => "none declared".to_owned(),
+        };
+        [
+            format!("noise of {channel}"),
+            significant(noise.sigma, 3),
+            declared,
+        ]
+    }));
+    if !rows.is_empty() {
+        blocks.push(table(["base law and noise", "found", ""], rows));
+    }
+    section("How much better", blocks)
+}
+
+/// The law's parameters: alone before repaired, the peak before its slip.
+fn base_in_order(diagnosis: &Diagnosis) -> impl Iterator<Item = (&str, &Estimate)> {
+    let mut rows: Vec<(&str, &Estimate)> = diagnosis
+        .base
+        .iter()
+        .map(|(name, value)| (name.as_str(), value))
+        .collect();
+    rows.sort_by_key(|(name, _)| {
+        (
+            name.starts_with("repaired_"),
+            !name.ends_with("peak_friction"),
+        )
+    });
+    rows.into_iter()
+}
+
+fn probability(p: f64) -> String {
+    if p < 0.001 {
+        "<0.001".to_owned()
+    } else {
+        format!("{p:.3}")
+    }
+}
+
+fn looked_for(diagnosis: &Diagnosis) -> Section {
+    let (hidden, visible) = unseen(diagnosis);
+    let what = |id: &str| Id::parse(id).map_or("", Id::what).to_owned();
+    let mut rows: Vec<[String; 4]> = Vec::new();
+    for entry in &diagnosis.looked_for {
+        if diagnosis
+            .mechanisms
+            .iter()
+            .any(|named| named.id == entry.id)
+        {
+            let effect = entry.minimum_detectable.as_ref();
+            let effect = effect.map_or(String::new(), |m| {
+                format!("{} {}", spoken(&m.name), least(m))
+            });
+            rows.push([spoken(entry.id), what(entry.id), "found".to_owned(), effect]);
+        }
+    }
+    rows.extend(visible.iter().map(|(entry, effect)| {
+        [
+            spoken(entry.id),
+            what(entry.id),
+            format!("not{NO_BREAK}found"),
+            format!("{} {}", spoken(&effect.name), least(effect)),
+        ]
+    }));
+    let unmeasured = diagnosis.looked_for.iter().filter(|entry| {
+        entry.identifiable
+            && entry.minimum_detectable.is_none()
+            && !diagnosis
+                .mechanisms
+                .iter()
+                .any(|named| named.id == entry.id)
+    });
+    rows.extend(unmeasured.map(|entry| {
+        [
+            spoken(entry.id),
+            what(entry.id),
+            format!("not{NO_BREAK}found"),
+            "not known".to_owned(),
+        ]
+    }));
+    rows.extend(hidden.iter().map(|entry| {
+        [
+            spoken(entry.id),
+            what(entry.id),
+            "cannot show in these recordings".to_owned(),
+            String::new(),
+        ]
+    }));
+    if rows.is_empty() {
+        return section("What was looked for", Vec::new());
+    }
+    let head = [
+        "mechanism",
+        "what it is",
+        "result",
+        "smallest effect that would have been seen",
+    ];
+    section("What was looked for", vec![table(head, rows)])
+}
+
+fn data(diagnosis: &Diagnosis) -> Section {
+    let mut blocks: Vec<Block> = diagnosis
+        .caveats
+        .iter()
+        .map(|text| Block::Paragraph(text.clone()))
+        .collect();
+    let faults = &diagnosis.data_faults;
+    if faults.is_empty() {
+        blocks.push(Block::Paragraph(
+            "No fault of the data was found.".to_owned(),
+        ));
+    } else {
+        if faults.len() > MOST_ROWS {
+            blocks.push(Block::Paragraph(format!(
+                "The first {MOST_ROWS} of {} faults; diagnosis.json has all.",
+                faults.len()
+            )));
+        }
+        let rows = faults
+            .iter()
+            .take(MOST_ROWS)
+            .map(|fault| {
+                [
+                    short_name(&fault.recording).to_owned(),
+                    fault.channel.clone(),
+                    stretch(fault.start_s, fault.end_s),
+                    fault.what.clone(),
+                ]
+            })
+            .collect();
+        blocks.push(table(["recording", "channel", "time", "fault"], rows));
+    }
+    let rows = diagnosis
+        .recordings
+        .iter()
+        .map(|recording| {
+            let role = match recording.role {
+                Role::Fit => "fitted",
+                Role::Holdout => "held out",
+            };
+            [
+                recording.path.clone(),
+                with_unit(recording.samples.to_string(), ""),
+                role.to_owned(),
+            ]
+        })
+        .collect();
+    blocks.push(table(["recording", "samples", "use"], rows));
+    section("Data", blocks)
+}
