@@ -1,0 +1,189 @@
+//! Frames survive what a wire does to them, and the telemetry fits the wire.
+
+use muslip_record::*;
+use proptest::prelude::*;
+
+fn envelope<T>(body: T) -> Envelope<T> {
+    Envelope {
+        sequence: u16::MAX,
+        body,
+    }
+}
+
+fn worst_sample() -> Telemetry {
+    Telemetry::Sample(Sample {
+        tick: u32::MAX,
+        wheel_speed_rad_s: f32::NAN,
+        vehicle_speed_m_s: 1.0,
+        drag_force_n: 1.0,
+        normal_force_n: 1.0,
+        brake_demand: 1.0,
+        state: State::Fault,
+    })
+}
+
+fn worst_estimate() -> Telemetry {
+    Telemetry::Estimate(Estimate {
+        tick: u32::MAX,
+        slip_ratio: 0.1,
+        friction: 0.1,
+        peak_friction: 0.1,
+        critical_slip: 0.1,
+        p00: 0.1,
+        p01: 0.1,
+        p11: 0.1,
+        updates: u32::MAX,
+    })
+}
+
+fn length<T: serde::Serialize>(message: &T) -> usize {
+    let mut buffer = [0; FRAME_BYTES];
+    encode(message, &mut buffer).map_or(usize::MAX, <[u8]>::len)
+}
+
+#[test]
+fn samples_and_estimates_leave_a_fifth_of_the_wire_free() {
+    let (sample, estimate) = (
+        length(&envelope(worst_sample())),
+        length(&envelope(worst_estimate())),
+    );
+    let a_second =
+        sample as u32 * SAMPLE_RATE_HZ + estimate as u32 * SAMPLE_RATE_HZ / SAMPLES_PER_ESTIMATE;
+    println!(
+        "sample {sample} bytes, estimate {estimate} bytes: {a_second} of {LINK_BYTES_PER_SECOND} bytes a second, {:.1} %",
+        100.0 * f64::from(a_second) / f64::from(LINK_BYTES_PER_SECOND)
+    );
+    assert!(sample < FRAME_BYTES && estimate < FRAME_BYTES);
+    assert!(a_second * 5 <= LINK_BYTES_PER_SECOND * 4);
+}
+
+#[test]
+fn the_longest_messages_fit_a_frame() {
+    let all = u32::MAX;
+    let status = Telemetry::Status(Status {
+        tick: all,
+        state: State::Fault,
+        fault: Some(Fault::Timeout),
+        standing: all,
+        link: LinkCounters {
+            received: all,
+            corrupt: all,
+            oversized: all,
+            foreign: all,
+            duplicate: all,
+            lost: all,
+            overrun_bytes: all,
+            dropped: all,
+        },
+        worst_interrupt_cycles: all,
+        worst_step_cycles: all,
+        stack_used_bytes: all,
+        stored: true,
+    });
+    let mut parameters = Parameters::default();
+    parameters.drag.zero_code = i32::MIN;
+    parameters.normal.zero_code = i32::MIN;
+    parameters.wheel_encoder.pulses_per_revolution = u16::MAX;
+    parameters.vehicle_encoder.pulses_per_revolution = u16::MAX;
+    let profile = Profile {
+        program: Program::Steps {
+            levels: [1.0; STEPS],
+            count: u8::MAX,
+            hold_s: 1.0,
+        },
+        start_speed_m_s: 1.0,
+        skid_slip: 1.0,
+        skid_hold_s: 1.0,
+        applications: u8::MAX,
+        cool_s: 1.0,
+    };
+    for length in [
+        length(&envelope(status)),
+        length(&envelope(Telemetry::Parameters(parameters))),
+        length(&envelope(Command::SetParameters { parameters })),
+        length(&envelope(Command::Start { profile })),
+    ] {
+        assert!(length <= FRAME_BYTES, "{length}");
+    }
+}
+
+/// Feeds bytes and collects what comes out.
+fn read(bytes: &[u8]) -> Vec<Result<Envelope<Telemetry>, FrameError>> {
+    let mut reader = FrameReader::new();
+    bytes.iter().filter_map(|&byte| reader.push(byte)).collect()
+}
+
+#[test]
+fn an_oversized_frame_is_reported_once_and_the_next_is_read() {
+    let mut bytes = vec![7; 5 * FRAME_BYTES];
+    bytes.push(0);
+    let mut buffer = [0; FRAME_BYTES];
+    bytes.extend_from_slice(encode(&envelope(worst_estimate()), &mut buffer).unwrap());
+    assert_eq!(
+        read(&bytes),
+        [Err(FrameError::Oversized), Ok(envelope(worst_estimate()))]
+    );
+}
+
+#[test]
+fn a_whole_frame_of_another_type_is_foreign() {
+    let mut buffer = [0; FRAME_BYTES];
+    let frame = encode(&[0xA5_u8; 30], &mut buffer).unwrap();
+    assert_eq!(read(frame), [Err(FrameError::Foreign)]);
+    // A message with something behind it is none of ours either.
+    let frame = encode(&(envelope(Command::Arm), 1_u8), &mut buffer).unwrap();
+    let mut reader = FrameReader::new();
+    let results: Vec<_> = frame
+        .iter()
+        .filter_map(|&byte| reader.push::<Envelope<Command>>(byte))
+        .collect();
+    assert_eq!(results, [Err(FrameError::Foreign)]);
+}
+
+#[test]
+fn a_message_too_long_is_refused() {
+    let mut buffer = [0; FRAME_BYTES];
+    assert_eq!(
+        encode(&([1_u64; 30], [u64::MAX; 30]), &mut buffer),
+        Err(EncodeError)
+    );
+}
+
+proptest! {
+    #[test]
+    fn stuffing_is_that_of_an_independent_implementation(body in prop::collection::vec(prop_oneof![Just(0_u8), any::<u8>()], 0..200)) {
+        let mut buffer = [0; FRAME_BYTES];
+        let frame = encode(&body.as_slice(), &mut buffer).unwrap();
+        prop_assert_eq!(frame.last(), Some(&0));
+        prop_assert!(!frame[..frame.len() - 1].contains(&0));
+        let mut decoded = vec![0; frame.len()];
+        let length = cobs::decode(&frame[..frame.len() - 1], &mut decoded).unwrap().frame_size();
+        // One byte of length (two from 128 on), the body, the checksum.
+        let prefix = if body.len() < 128 { 1 } else { 2 };
+        prop_assert_eq!(&decoded[prefix..length - 4], body.as_slice());
+        // The CRC of message and checksum is the residue that IEEE 802.3 names.
+        let residue = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC).checksum(&decoded[..length]);
+        prop_assert_eq!(residue, 0x2144_DF1C);
+    }
+
+    #[test]
+    fn one_changed_byte_never_passes(at in 0_usize..30, change in 1_u8..=255) {
+        let mut buffer = [0; FRAME_BYTES];
+        let mut bytes = encode(&envelope(worst_sample()), &mut buffer).unwrap().to_vec();
+        let at = at % bytes.len();
+        bytes[at] ^= change;
+        bytes.push(0);
+        let results = read(&bytes);
+        prop_assert!(results.iter().all(Result::is_err), "{:?}", results);
+    }
+
+    #[test]
+    fn any_bytes_are_survived_and_the_frame_after_a_zero_is_read(noise in prop::collection::vec(any::<u8>(), 0..600)) {
+        let mut bytes = noise;
+        bytes.push(0);
+        let mut buffer = [0; FRAME_BYTES];
+        bytes.extend_from_slice(encode(&envelope(worst_estimate()), &mut buffer).unwrap());
+        let results = read(&bytes);
+        prop_assert_eq!(results.last(), Some(&Ok(envelope(worst_estimate()))));
+    }
+}
