@@ -6,6 +6,7 @@
 
 use rayon::prelude::*;
 
+use crate::ablation::Ablation;
 use crate::fit::{Fitted, Joint};
 use crate::mechanism::{Balance, Evidence, Id, Stage};
 use crate::model::{Model, Term};
@@ -24,6 +25,8 @@ pub struct Limits {
     pub most: usize,
     /// Models kept at each size.
     pub beam: usize,
+    /// Parts of the argument left out, to measure their worth.
+    pub ablation: Ablation,
 }
 
 impl Default for Limits {
@@ -34,6 +37,7 @@ impl Default for Limits {
             form_misfit: 0.03,
             most: 4,
             beam: 4,
+            ablation: Ablation::default(),
         }
     }
 }

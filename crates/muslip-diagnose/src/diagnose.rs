@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use nalgebra::DMatrix;
 
+use crate::ablation::Ablation;
 use crate::campaign::{Rig, Run};
 use crate::choose::{Limits, Search};
 use crate::confidence::{alternatives, covariance, figures, membership};
@@ -31,10 +32,24 @@ pub type Progress<'a> = &'a (dyn Fn(f64, &str) + Sync);
 /// the number of threads.
 #[must_use]
 pub fn diagnose(rig: &Rig, runs: &[Run], progress: Progress<'_>) -> Diagnosis {
+    diagnose_without(rig, runs, Ablation::default(), progress)
+}
+
+/// The same with parts of the argument left out.
+#[must_use]
+pub fn diagnose_without(
+    rig: &Rig,
+    runs: &[Run],
+    ablation: Ablation,
+    progress: Progress<'_>,
+) -> Diagnosis {
     progress(0.0, "cleaning and smoothing the recordings");
     let data = Data::new(rig, runs);
     let split = Split::new(&data);
-    let limits = Limits::default();
+    let limits = Limits {
+        ablation,
+        ..Limits::default()
+    };
     let tyre = tyre_stage::analyse(&data, &split, &limits, &progress);
     progress(0.75, "wheel and vehicle");
     let chain = tyre

@@ -17,6 +17,7 @@
 //! | remainder | [`remainder`] |
 //! | location | [`locate`] |
 //! | how sure, and what was looked for | [`confidence`], [`separating`], [`looked`] |
+//! | what each part is worth | [`ablation`] |
 //! | result and repaired model | [`diagnose`](mod@diagnose), [`outcome`], [`repaired`] |
 //!
 //! It knows no file format and no terminal, and gives the same result whatever the number of threads.
@@ -26,6 +27,7 @@
     reason = "`!(x > 0.0)` sends NaN the refusing way"
 )]
 
+pub mod ablation;
 pub mod campaign;
 pub mod choose;
 pub mod confidence;

@@ -171,7 +171,14 @@ fn remainders(
     let count = found.count;
     let data = joint.data();
     let explained = found.base.criterion - found.chosen.criterion;
-    let left = candidates(problem, &found.chosen.fitted.model);
+    let dependences = |model: &Model| {
+        if limits.ablation.remainder {
+            Vec::new()
+        } else {
+            candidates(problem, model)
+        }
+    };
+    let left = dependences(&found.chosen.fitted.model);
     let mut unexplained: Vec<Remainder> = Vec::new();
     let mut corrections: Vec<Remainder> = Vec::new();
     if found.chosen.ids.is_empty() {
@@ -183,7 +190,7 @@ fn remainders(
         }
     } else {
         // Does one free dependence account for more than the mechanisms do?
-        let free = candidates(problem, &found.base.fitted.model);
+        let free = dependences(&found.base.fitted.model);
         let rival = free.first().filter(|top| {
             top.worth(count) * MECHANISM_SHARE > explained
                 && !counterparts(&top.word, &data.context)

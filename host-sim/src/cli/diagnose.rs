@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
 use clap::Args;
+use muslip_diagnose::ablation::{Ablation, Part};
 
 use super::Failure;
 use super::progress::Progress;
@@ -32,6 +33,10 @@ pub(super) struct Arguments {
     /// Print diagnosis.json and nothing else.
     #[arg(long)]
     json: bool,
+    /// Leave out a part of the argument, to measure what it is worth: remainder, errors-in-variables or
+    /// prefilter; may be repeated. For the trials of the documentation.
+    #[arg(long = "ablate", value_name = "PART", value_parser = part, hide = true)]
+    ablate: Vec<Part>,
     /// The recordings (CSV), one file a run.
     #[arg(value_name = "RUN.csv", required = true)]
     recordings: Vec<PathBuf>,
@@ -42,6 +47,13 @@ const STEPS: f64 = 1000.0;
 const READING: f64 = 100.0;
 
 pub(super) fn run(arguments: &Arguments, terminal: &mut Terminal) -> Result<(), Failure> {
+    let ablation = arguments
+        .ablate
+        .iter()
+        .try_fold(Ablation::default(), |ablation, part| {
+            ablation.without(*part)
+        })
+        .unwrap_or_default();
     let bar = Mutex::new(Progress::new("read", STEPS as u64));
     let tell = |what: &str, steps: f64| {
         let mut bar = bar.lock().unwrap_or_else(PoisonError::into_inner);
@@ -53,7 +65,7 @@ pub(super) fn run(arguments: &Arguments, terminal: &mut Terminal) -> Result<(), 
     })?;
     let out = &arguments.out;
     job::prepare_folder(out)?;
-    let diagnosis = job::run(campaign, &|share, what| {
+    let diagnosis = job::run(campaign, ablation, &|share, what| {
         tell(what, READING + (STEPS - READING) * share);
     });
     let text = job::write(out, &diagnosis, &command(arguments))?;
@@ -69,6 +81,21 @@ pub(super) fn run(arguments: &Arguments, terminal: &mut Terminal) -> Result<(), 
         terminal.line(line)?;
     }
     Ok(())
+}
+
+/// A part of the argument by its word, refused where the engine cannot do without it.
+fn part(word: &str) -> Result<Part, String> {
+    let part = Part::ALL
+        .into_iter()
+        .find(|part| part.word() == word)
+        .ok_or_else(|| {
+            let known: Vec<&str> = Part::ALL.iter().map(|part| part.word()).collect();
+            format!("not a part of the argument: one of {}", known.join(", "))
+        })?;
+    if Ablation::default().without(part).is_none() {
+        return Err("the engine cannot do without it yet".to_owned());
+    }
+    Ok(part)
 }
 
 /// The command that makes the report again, without where it goes.

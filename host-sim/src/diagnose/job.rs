@@ -3,7 +3,8 @@
 use std::io::Write as _;
 use std::path::Path;
 
-use muslip_diagnose::diagnose::diagnose;
+use muslip_diagnose::ablation::Ablation;
+use muslip_diagnose::diagnose::diagnose_without;
 use muslip_diagnose::outcome::{Diagnosis, Fault};
 
 use super::load::Campaign;
@@ -32,9 +33,13 @@ pub enum WriteError {
 /// Runs the engine on a campaign. The recordings are given up, so that they need not lie in memory any
 /// longer than the engine needs them. What had to be mended to read them joins the faults of the data.
 #[must_use]
-pub fn run(campaign: Campaign, progress: &(dyn Fn(f64, &str) + Sync)) -> Diagnosis {
+pub fn run(
+    campaign: Campaign,
+    ablation: Ablation,
+    progress: &(dyn Fn(f64, &str) + Sync),
+) -> Diagnosis {
     let Campaign { rig, runs, faults } = campaign;
-    let mut diagnosis = diagnose(&rig, &runs, progress);
+    let mut diagnosis = diagnose_without(&rig, &runs, ablation, progress);
     drop(runs);
     add_faults(&mut diagnosis, faults);
     json::make_finite(&mut diagnosis);
