@@ -111,10 +111,12 @@ pub struct EstimatorParameters {
 /// Slip control.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct SlipControlParameters {
-    /// Proportional gain in N m for each unit of slip, >= 0.
-    pub proportional_nm: f32,
-    /// Integral gain in N m for each unit of slip and second, >= 0.
-    pub integral_nm_s: f32,
+    /// Bandwidth of the slip loop in rad/s, > 0.
+    pub bandwidth_rad_s: f32,
+    /// Integral time in s, > 0.
+    pub integral_time_s: f32,
+    /// Fastest change of the brake torque in N m/s, > 0.
+    pub maximum_torque_rate_nm_s: f32,
 }
 
 impl Default for Parameters {
@@ -164,8 +166,9 @@ impl Default for Parameters {
                 skid_slip_maximum: 0.98,
             },
             slip_control: SlipControlParameters {
-                proportional_nm: 4000.0,
-                integral_nm_s: 8000.0,
+                bandwidth_rad_s: 20.0,
+                integral_time_s: 0.3,
+                maximum_torque_rate_nm_s: 10_000.0,
             },
         }
     }

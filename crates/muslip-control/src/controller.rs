@@ -1,0 +1,433 @@
+//! The controller: interlocks, state machine, estimates and link, put together.
+
+use heapless::Vec;
+use muslip_record::{
+    Answer, Command, Event, Fault, Hello, PROTOCOL_VERSION, Parameters, Program, Refusal,
+    SAMPLE_RATE_HZ, SAMPLES_PER_ESTIMATE, SCHEMA_HASH, Sample, State, Status, Telemetry,
+};
+
+use crate::board::{Actuators, BridgeQuality, NotStored, RawSample};
+use crate::brake::BrakeOutput;
+use crate::conversion::{Conversion, Converted, Tare};
+use crate::estimation::Estimation;
+use crate::interlock::{Circumstances, FaultSet, Interlocks};
+use crate::link::{Arrival, Link, Transmit, Urgency};
+use crate::sequence::{Observed, Sequence};
+use crate::validate;
+
+/// Received bytes that one sample's work looks at: more than the wire brings in a sample.
+const BYTES_A_SAMPLE: usize = 128;
+
+/// What the board is and how it came up.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Identity {
+    /// Core clock in Hz.
+    pub core_clock_hz: u32,
+    /// True in the emulator.
+    pub emulated: bool,
+    /// The independent watchdog caused the reset.
+    pub watchdog_reset: bool,
+    /// The core runs slower than it should.
+    pub slow_clock: bool,
+    /// The parameters are those in flash.
+    pub stored: bool,
+}
+
+/// What the work has taken so far.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Resources {
+    /// Most cycles of one sampling interrupt.
+    pub worst_interrupt_cycles: u32,
+    /// Most cycles of one sample's work in the main loop.
+    pub worst_step_cycles: u32,
+    /// Deepest stack in bytes.
+    pub stack_used_bytes: u32,
+}
+
+/// Checked parameters that still make no controller.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct BadParameters(pub u8);
+
+/// The controller.
+#[derive(Debug, Clone)]
+pub struct Controller {
+    identity: Identity,
+    parameters: Parameters,
+    conversion: Conversion,
+    interlocks: Interlocks,
+    sequence: Sequence,
+    estimation: Estimation,
+    link: Link,
+    resources: Resources,
+    tick: u32,
+    sample: Option<Sample>,
+    converted: Option<Converted>,
+    standing: FaultSet,
+    events: Vec<(u32, Event), 8>,
+    tare: Option<Tare>,
+    tared: bool,
+    stop: bool,
+    overran: bool,
+    watchdog_reset: bool,
+}
+
+impl Controller {
+    /// Idle, brake dumped; faulted after a reset by the watchdog.
+    ///
+    /// # Errors
+    /// [`BadParameters`] with the number of the first field outside its range.
+    pub fn new(parameters: &Parameters, identity: Identity) -> Result<Self, BadParameters> {
+        validate::parameters(parameters).map_err(BadParameters)?;
+        let estimation = Estimation::new(parameters).map_err(|_| BadParameters(NOISE_FIELD))?;
+        let mut sequence = Sequence::default();
+        if identity.watchdog_reset {
+            sequence.fail(Fault::Watchdog);
+        }
+        Ok(Self {
+            identity,
+            parameters: *parameters,
+            conversion: Conversion::new(parameters),
+            interlocks: Interlocks::new(parameters),
+            sequence,
+            estimation,
+            link: Link::new(),
+            resources: Resources::default(),
+            tick: 0,
+            sample: None,
+            converted: None,
+            standing: FaultSet::default(),
+            events: Vec::new(),
+            tare: None,
+            tared: false,
+            stop: false,
+            overran: false,
+            watchdog_reset: identity.watchdog_reset,
+        })
+    }
+
+    /// Where the run is.
+    pub fn state(&self) -> State {
+        self.sequence.state()
+    }
+
+    /// The latched fault.
+    pub fn fault(&self) -> Option<Fault> {
+        self.sequence.fault()
+    }
+
+    /// The parameters in use.
+    pub fn parameters(&self) -> &Parameters {
+        &self.parameters
+    }
+
+    /// Says what the work has taken so far.
+    pub fn set_resources(&mut self, resources: Resources) {
+        self.resources = resources;
+    }
+
+    /// Says how many received bytes were lost before they were read, in all.
+    pub fn set_overrun_bytes(&mut self, total: u32) {
+        self.link.set_overrun_bytes(total);
+    }
+
+    /// Says that the sample just worked on took longer than a sample: a fault on the next.
+    pub fn overran(&mut self) {
+        self.overran = true;
+    }
+
+    /// The work of one sample, up to what the valves are told. Does no input or output.
+    pub fn control(&mut self, raw: &RawSample) -> BrakeOutput {
+        self.tick = self.tick.wrapping_add(1);
+        self.link.tick();
+        let converted = self.conversion.convert(raw);
+        self.converted = Some(converted);
+
+        let circumstances = Circumstances {
+            silent_samples: self.link.silent_samples(),
+            estimator_failed: self.estimation.failed(),
+            overran: core::mem::take(&mut self.overran),
+            watchdog_reset: self.watchdog_reset,
+            slow_clock: self.identity.slow_clock,
+            timed_out: self.sequence.timed_out(),
+        };
+        self.standing = self.interlocks.check(raw, &converted, &circumstances);
+        let before = self.sequence.state();
+        if self.sequence.is_engaged()
+            && let Some(fault) = self.standing.first()
+        {
+            self.sequence.fail(fault);
+            self.event(Event::Fault(fault));
+        }
+
+        let point = self.estimation.observe(&converted.sample);
+        let observed = Observed {
+            slip_ratio: point.map(|point| point.slip_ratio),
+            vehicle_speed_m_s: converted.sample.vehicle_speed_m_s,
+            stop: core::mem::take(&mut self.stop),
+        };
+        let demand = self.sequence.step(&observed, |_| 0.0);
+        if matches!(before, State::Ramp | State::Skid | State::Release)
+            && self.sequence.state() != State::Fault
+        {
+            self.estimation.update();
+        }
+        let after = self.sequence.state();
+        if after != before {
+            self.event(Event::StateChanged {
+                from: before,
+                to: after,
+            });
+        }
+
+        let output = BrakeOutput::for_demand(demand, &self.parameters.brake);
+        self.sample = Some(Sample {
+            tick: self.tick,
+            wheel_speed_rad_s: converted.sample.wheel_speed_rad_s,
+            vehicle_speed_m_s: converted.sample.vehicle_speed_m_s,
+            drag_force_n: converted.sample.drag_force_n,
+            normal_force_n: converted.sample.normal_force_n,
+            brake_demand: demand,
+            state: after,
+        });
+        self.tare(raw);
+        output
+    }
+
+    /// The link's work after a sample: commands out of what was received, telemetry to the wire.
+    pub fn communicate(
+        &mut self,
+        mut receive: impl FnMut() -> Option<u8>,
+        wire: &mut impl Transmit,
+        actuators: &mut impl Actuators,
+    ) {
+        for _ in 0..BYTES_A_SAMPLE {
+            let Some(byte) = receive() else { break };
+            match self.link.receive(byte) {
+                Some(Arrival::Command(number, command)) => {
+                    let answer = self.obey(&command, wire, actuators);
+                    self.link.answered(number, answer);
+                    self.answer(number, answer, wire);
+                }
+                Some(Arrival::Repeated(number, answer)) => self.answer(number, answer, wire),
+                None => {}
+            }
+        }
+        if core::mem::take(&mut self.tared) {
+            // Zeros that cannot be stored still hold until the next reset.
+            self.identity.stored = actuators.store(&self.parameters).is_ok();
+        }
+        for (tick, event) in core::mem::take(&mut self.events) {
+            self.link
+                .send(Telemetry::Event { tick, event }, Urgency::Prompt, wire);
+        }
+        if let Some(sample) = self.sample.take() {
+            self.link
+                .send(Telemetry::Sample(sample), Urgency::Stream, wire);
+            if self.tick.is_multiple_of(SAMPLES_PER_ESTIMATE) {
+                let estimate = self.estimation.report(self.tick);
+                self.link
+                    .send(Telemetry::Estimate(estimate), Urgency::Stream, wire);
+            }
+        }
+    }
+
+    fn answer(&mut self, command: u16, answer: Answer, wire: &mut impl Transmit) {
+        self.link
+            .send(Telemetry::Answer { command, answer }, Urgency::Prompt, wire);
+    }
+
+    fn obey(
+        &mut self,
+        command: &Command,
+        wire: &mut impl Transmit,
+        actuators: &mut impl Actuators,
+    ) -> Answer {
+        let done = match command {
+            Command::KeepAlive => Ok(()),
+            Command::Hello => {
+                self.reply(Telemetry::Hello(self.hello()), wire);
+                Ok(())
+            }
+            Command::ReadParameters => {
+                self.reply(Telemetry::Parameters(self.parameters), wire);
+                Ok(())
+            }
+            Command::ReadStatus => {
+                self.reply(Telemetry::Status(self.status()), wire);
+                Ok(())
+            }
+            Command::Arm => self.arm(),
+            Command::Start { profile } => self.start(profile),
+            Command::Stop => {
+                self.stop = true;
+                Ok(())
+            }
+            Command::Tare => self.begin_tare(),
+            Command::ClearFault => self.clear_fault(),
+            Command::SetParameters { parameters } => self.set_parameters(parameters, actuators),
+        };
+        match done {
+            Ok(()) => Answer::Done,
+            Err(refusal) => Answer::Refused(refusal),
+        }
+    }
+
+    fn reply(&mut self, message: Telemetry, wire: &mut impl Transmit) {
+        self.link.send(message, Urgency::Prompt, wire);
+    }
+
+    fn hello(&self) -> Hello {
+        Hello {
+            protocol_version: PROTOCOL_VERSION,
+            schema_hash: SCHEMA_HASH,
+            sample_rate_hz: SAMPLE_RATE_HZ as u16,
+            core_clock_hz: self.identity.core_clock_hz,
+            emulated: self.identity.emulated,
+        }
+    }
+
+    fn status(&self) -> Status {
+        Status {
+            tick: self.tick,
+            state: self.sequence.state(),
+            fault: self.sequence.fault(),
+            standing: self.standing.bits(),
+            link: self.link.counters(),
+            worst_interrupt_cycles: self.resources.worst_interrupt_cycles,
+            worst_step_cycles: self.resources.worst_step_cycles,
+            stack_used_bytes: self.resources.stack_used_bytes,
+            stored: self.identity.stored,
+        }
+    }
+
+    fn arm(&mut self) -> Result<(), Refusal> {
+        // The command itself is the host's word. No sample yet: nothing is known to be well.
+        let standing = self.standing.without(Fault::LinkSilent);
+        if self.tick == 0 {
+            return Err(Refusal::WrongState(self.sequence.state()));
+        }
+        if self.tare.is_some() {
+            return Err(Refusal::Moving);
+        }
+        if let Some(fault) = standing.first() {
+            return Err(Refusal::Interlock(fault));
+        }
+        let before = self.sequence.state();
+        self.sequence.arm().map_err(Refusal::WrongState)?;
+        self.changed(before);
+        Ok(())
+    }
+
+    fn start(&mut self, profile: &muslip_record::Profile) -> Result<(), Refusal> {
+        if !validate::profile(profile) || matches!(profile.program, Program::SlipHold { .. }) {
+            return Err(Refusal::Profile);
+        }
+        let before = self.sequence.state();
+        self.sequence.start(profile).map_err(Refusal::WrongState)?;
+        self.changed(before);
+        self.estimation.reset();
+        self.stop = false;
+        Ok(())
+    }
+
+    fn clear_fault(&mut self) -> Result<(), Refusal> {
+        // What only the controller itself can end ends here.
+        let standing = self
+            .standing
+            .without(Fault::LinkSilent)
+            .without(Fault::EstimatorFault)
+            .without(Fault::Watchdog)
+            .without(Fault::Timeout);
+        if let Some(fault) = self
+            .sequence
+            .fault()
+            .filter(|&fault| standing.contains(fault))
+        {
+            return Err(Refusal::Interlock(fault));
+        }
+        let before = self.sequence.state();
+        self.sequence.clear().map_err(Refusal::WrongState)?;
+        self.changed(before);
+        self.estimation.reset();
+        self.watchdog_reset = false;
+        self.standing = standing;
+        Ok(())
+    }
+
+    fn stands_still(&self) -> bool {
+        self.converted
+            .is_some_and(|now| now.wheel.rad_s == 0.0 && now.vehicle.rad_s == 0.0)
+    }
+
+    fn begin_tare(&mut self) -> Result<(), Refusal> {
+        if !self.sequence.is_at_rest() {
+            return Err(Refusal::WrongState(self.sequence.state()));
+        }
+        if !self.stands_still() {
+            return Err(Refusal::Moving);
+        }
+        for fault in [Fault::BridgeLost, Fault::BridgeFrozen] {
+            if self.standing.contains(fault) {
+                return Err(Refusal::Interlock(fault));
+            }
+        }
+        self.tare = Some(Tare::default());
+        Ok(())
+    }
+
+    /// Goes on with a tare; motion or a bad code ends it with nothing changed.
+    fn tare(&mut self, raw: &RawSample) {
+        let Some(mut tare) = self.tare.take() else {
+            return;
+        };
+        if raw.bridge.quality != BridgeQuality::Fresh || !self.stands_still() {
+            return;
+        }
+        match tare.push(raw.bridge.codes) {
+            None => self.tare = Some(tare),
+            Some([drag, normal]) => {
+                self.parameters.drag.zero_code = drag;
+                self.parameters.normal.zero_code = normal;
+                self.conversion.set_zero_codes(drag, normal);
+                self.tared = true;
+                self.event(Event::Tared);
+            }
+        }
+    }
+
+    fn set_parameters(
+        &mut self,
+        parameters: &Parameters,
+        actuators: &mut impl Actuators,
+    ) -> Result<(), Refusal> {
+        if !self.sequence.is_at_rest() {
+            return Err(Refusal::WrongState(self.sequence.state()));
+        }
+        validate::parameters(parameters).map_err(Refusal::Parameter)?;
+        self.estimation =
+            Estimation::new(parameters).map_err(|_| Refusal::Parameter(NOISE_FIELD))?;
+        self.parameters = *parameters;
+        self.conversion = Conversion::new(parameters);
+        self.interlocks = Interlocks::new(parameters);
+        self.tare = None;
+        self.identity.stored = false;
+        actuators
+            .store(parameters)
+            .map_err(|NotStored| Refusal::Storage)?;
+        self.identity.stored = true;
+        Ok(())
+    }
+
+    fn changed(&mut self, from: State) {
+        let to = self.sequence.state();
+        self.event(Event::StateChanged { from, to });
+    }
+
+    fn event(&mut self, event: Event) {
+        // More than eight in one sample cannot happen; were it so, the first are the ones to keep.
+        let _ = self.events.push((self.tick, event));
+    }
+}
+
+/// Number of the filter's noise among the parameters.
+const NOISE_FIELD: u8 = 21;

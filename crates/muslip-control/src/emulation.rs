@@ -1,0 +1,78 @@
+//! What the emulated board and the rig simulator say to each other, in frames like those of the link.
+//!
+//! A sample goes in, and the firmware's answer comes out before the next may go in: lock-step. Totals of the
+//! link's bytes go with both, so that its two streams are ordered against the samples as well.
+
+use serde::{Deserialize, Serialize};
+
+use crate::board::RawSample;
+use crate::brake::BrakeOutput;
+
+/// From the simulator.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub enum ToFirmware {
+    /// One sample.
+    Sample {
+        /// What the sensors read.
+        raw: RawSample,
+        /// Bytes sent on the link so far: the sample's work begins when all have arrived.
+        link_sent: u32,
+        /// Bytes that the link's wire takes during this sample.
+        link_room: u16,
+        /// Instructions to waste in this sample's work.
+        burn: u32,
+    },
+    /// Let the 1 kHz timer run freely on this sample.
+    FreeRun {
+        /// What the sensors read, each time.
+        raw: RawSample,
+        /// How many samples.
+        samples: u16,
+        /// Instructions to waste in each sample's work.
+        burn: u32,
+    },
+    /// Execute an undefined instruction, as memory gone bad would.
+    HardFault,
+}
+
+/// From the firmware.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub enum FromFirmware {
+    /// Start-up is done.
+    Ready,
+    /// A sample's work is done.
+    Sample {
+        /// Samples since start.
+        tick: u32,
+        /// What the valves were told.
+        output: BrakeOutput,
+        /// Instructions of the sampling interrupt.
+        interrupt_instructions: u32,
+        /// Instructions of the control step.
+        control_instructions: u32,
+        /// Instructions of the step and of the link's work after it.
+        step_instructions: u32,
+        /// Deepest stack so far in bytes.
+        stack_bytes: u32,
+        /// Bytes sent on the link so far.
+        link_sent: u32,
+    },
+    /// A free run is over.
+    FreeRun {
+        /// Samples that the timer asked for.
+        samples: u32,
+        /// Samples whose work was done.
+        worked: u32,
+        /// Times that the interrupt found a sample not taken and dumped the brake.
+        late: u32,
+        /// Time passed by another timer, in ns.
+        elapsed_ns: u32,
+        /// What the valves were told last.
+        output: BrakeOutput,
+    },
+    /// A fault handler ran; the brake was dumped before this was sent.
+    Dumped {
+        /// True for a panic, false for a hard fault.
+        panic: bool,
+    },
+}

@@ -1,0 +1,259 @@
+//! Speed from pulses: count and period combined.
+//!
+//! Speed is whole pulses over the time between the first and the last of them, both stamped by a timer:
+//!
+//! ```text
+//! ω = (2π / pulses a revolution) · pulses / (t_last - t_last_before)
+//! ```
+//!
+//! so its resolution is that of the timer at any speed (the constant-elapsed-time method: R. Bonert, IEEE
+//! Trans. Industrial Electronics 36 (1989); T. Ohmae et al., ibid. 29 (1982)). Between pulses the speed cannot
+//! be more than one pulse over the time that has passed, which bounds it from above; with no pulse
+//! for [`STANDSTILL_S`] it is zero.
+
+use crate::EDGE_TIMER_HZ;
+use crate::board::EncoderReading;
+use muslip_record::EncoderParameters;
+
+/// Time without a pulse after which an encoder stands still, in s.
+pub const STANDSTILL_S: f32 = 0.25;
+
+const TICK_S: f32 = 1.0 / EDGE_TIMER_HZ as f32;
+const STANDSTILL_TICKS: u32 = EDGE_TIMER_HZ / 4;
+
+/// Edges up to the last rising one, from a counter in quadrature mode that counts both edges of channel A
+/// and was preset odd where A was high.
+///
+/// An odd count then always means that A is high, whichever way it turns: its last edge rose. An even
+/// count means that the edge before it, one step back, did. Both polarities together would measure the
+/// encoder's duty as well as its speed.
+#[inline]
+pub fn rising_edges(count: u16, counts_down: bool) -> u16 {
+    if count & 1 == 1 {
+        count
+    } else if counts_down {
+        count.wrapping_add(1)
+    } else {
+        count.wrapping_sub(1)
+    }
+}
+
+/// Speed of one encoder.
+#[derive(Debug, Clone, Copy)]
+pub struct SpeedMeter {
+    radians_per_pulse: f32,
+    reversed: bool,
+    last: Option<(u16, u32)>,
+    /// No pulse for [`STANDSTILL_S`], or none yet: the time of the last one means nothing.
+    stands: bool,
+    /// At the last pulse.
+    measured_rad_s: f32,
+    speed_rad_s: f32,
+}
+
+/// What an encoder says at one sample.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Speed {
+    /// Speed in rad/s, positive forward.
+    pub rad_s: f32,
+    /// Speed in rad/s as measured at the last pulse.
+    pub at_last_pulse_rad_s: f32,
+    /// Time since the last pulse in s; [`STANDSTILL_S`] at standstill.
+    pub age_s: f32,
+    /// True where this sample brought a pulse.
+    pub pulsed: bool,
+}
+
+impl SpeedMeter {
+    /// At standstill.
+    pub fn new(encoder: &EncoderParameters) -> Self {
+        Self {
+            radians_per_pulse: core::f32::consts::TAU
+                / f32::from(encoder.pulses_per_revolution.max(1)),
+            reversed: encoder.reversed,
+            last: None,
+            stands: true,
+            measured_rad_s: 0.0,
+            speed_rad_s: 0.0,
+        }
+    }
+
+    /// Takes the reading of the next sample.
+    pub fn update(&mut self, reading: &EncoderReading) -> Speed {
+        let (edges, ticks) = self.last.unwrap_or((reading.edges, reading.edge_ticks));
+        // Wraps rightly as long as fewer than 16,384 pulses come in a sample.
+        let pulses = reading.edges.wrapping_sub(edges).cast_signed() / 2;
+        let pulsed = pulses != 0;
+        if pulsed {
+            let period = reading.edge_ticks.wrapping_sub(ticks);
+            if self.stands {
+                // The first pulse after a standstill has no period.
+                self.stands = false;
+                self.measured_rad_s = 0.0;
+            } else if period > 0 {
+                let forward = if self.reversed {
+                    -f32::from(pulses)
+                } else {
+                    f32::from(pulses)
+                };
+                self.measured_rad_s = forward * self.radians_per_pulse / (period as f32 * TICK_S);
+            }
+            self.speed_rad_s = self.measured_rad_s;
+        }
+        self.last = Some((reading.edges, reading.edge_ticks));
+        if !pulsed && reading.age_ticks >= STANDSTILL_TICKS {
+            self.stands = true;
+        }
+        if self.stands {
+            self.speed_rad_s = 0.0;
+            self.measured_rad_s = 0.0;
+            return Speed {
+                rad_s: 0.0,
+                at_last_pulse_rad_s: 0.0,
+                age_s: STANDSTILL_S,
+                pulsed,
+            };
+        }
+        let age_s = reading.age_ticks as f32 * TICK_S;
+        if !pulsed {
+            let bound = self.radians_per_pulse / age_s.max(TICK_S);
+            self.speed_rad_s = self.speed_rad_s.clamp(-bound, bound);
+        }
+        Speed {
+            rad_s: self.speed_rad_s,
+            at_last_pulse_rad_s: self.measured_rad_s,
+            age_s,
+            pulsed,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::SAMPLE_S;
+
+    /// An encoder that turns at a given speed from a given phase, sampled at 1 kHz, its timer starting just
+    /// before it wraps.
+    struct Encoder {
+        pulses_per_revolution: f64,
+        pulses: f64,
+        edge_s: f64,
+        now_s: f64,
+    }
+
+    const START_TICKS: u32 = u32::MAX - 100_000;
+
+    impl Encoder {
+        fn new(pulses_per_revolution: u16) -> (Self, SpeedMeter) {
+            let parameters = EncoderParameters {
+                pulses_per_revolution,
+                reversed: false,
+            };
+            let encoder = Self {
+                pulses_per_revolution: f64::from(pulses_per_revolution),
+                pulses: 0.3,
+                edge_s: 0.0,
+                now_s: 0.0,
+            };
+            (encoder, SpeedMeter::new(&parameters))
+        }
+
+        fn sample(&mut self, rad_s: f64) -> EncoderReading {
+            let rate = rad_s / core::f64::consts::TAU * self.pulses_per_revolution;
+            let end = self.pulses + rate * f64::from(SAMPLE_S);
+            self.now_s += f64::from(SAMPLE_S);
+            if end.floor() != self.pulses.floor() {
+                let whole = if rate > 0.0 { end.floor() } else { end.ceil() };
+                self.edge_s = self.now_s - (end - whole) / rate;
+            }
+            self.pulses = end;
+            let ticks = |s: f64| (s * f64::from(EDGE_TIMER_HZ)).round() as u64 as u32;
+            EncoderReading {
+                edges: (self.pulses.floor() as i64 * 2 + 1) as u16,
+                edge_ticks: START_TICKS.wrapping_add(ticks(self.edge_s)),
+                age_ticks: ticks(self.now_s).wrapping_sub(ticks(self.edge_s)),
+            }
+        }
+    }
+
+    #[test]
+    fn speed_is_as_fine_at_low_speed_as_at_high_speed_and_across_both_wraps() {
+        for pulses_per_revolution in [48, 500, 4096] {
+            for rad_s in [1.0, 3.3, 65.0, 140.0] {
+                let (mut encoder, mut meter) = Encoder::new(pulses_per_revolution);
+                let settle = (2.2 * core::f64::consts::TAU / rad_s * 1000.0
+                    / f64::from(pulses_per_revolution)) as usize
+                    + 2;
+                for index in 0..4000 {
+                    let speed = meter.update(&encoder.sample(rad_s));
+                    if index > settle {
+                        let error = f64::from(speed.rad_s) / rad_s - 1.0;
+                        assert!(
+                            error.abs() < 5e-5,
+                            "{pulses_per_revolution} {rad_s} {error}"
+                        );
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn without_pulses_speed_falls_and_ends_at_standstill_for_good() {
+        let (mut encoder, mut meter) = Encoder::new(500);
+        for _ in 0..100 {
+            meter.update(&encoder.sample(60.0));
+        }
+        let mut last = 60.1;
+        for index in 0..60_000 {
+            let speed = meter.update(&encoder.sample(0.0));
+            assert!(speed.rad_s <= last && !speed.pulsed);
+            // One pulse over the time passed, and zero from the time-out on: also when the timer has
+            // come round (51 s) and the age reads small again.
+            let passed = (f64::from(index) + 1.0) * 1e-3;
+            assert!(
+                f64::from(speed.rad_s) <= 0.012_57 / passed,
+                "{passed} {}",
+                speed.rad_s
+            );
+            assert!(passed < 0.26 || speed.rad_s == 0.0, "{passed}");
+            last = speed.rad_s;
+        }
+        // Again in motion: the first pulse has no period, the second has the right one.
+        let mut speeds = [0.0; 20];
+        for speed in &mut speeds {
+            *speed = meter.update(&encoder.sample(60.0)).rad_s;
+        }
+        assert_eq!(speeds[0], 0.0);
+        assert!((speeds[2] - 60.0).abs() < 0.01, "{speeds:?}");
+    }
+
+    #[test]
+    fn backwards_is_negative_and_a_reversed_encoder_turns_it_round() {
+        let (mut encoder, mut meter) = Encoder::new(500);
+        let mut reversed = SpeedMeter::new(&EncoderParameters {
+            pulses_per_revolution: 500,
+            reversed: true,
+        });
+        let mut speeds = (0.0, 0.0);
+        for _ in 0..50 {
+            let reading = encoder.sample(-20.0);
+            speeds = (
+                meter.update(&reading).rad_s,
+                reversed.update(&reading).rad_s,
+            );
+        }
+        assert!((speeds.0 + 20.0).abs() < 1e-2, "{speeds:?}");
+        assert_eq!(speeds.0, -speeds.1);
+    }
+
+    #[test]
+    fn the_last_rising_edge_is_found_from_a_count_of_both_edges_in_both_directions() {
+        // Forward: low 0, rise 1, fall 2, rise 3. The rising edges are 1 and 3.
+        assert_eq!([1, 2, 3, 4].map(|c| rising_edges(c, false)), [1, 1, 3, 3]);
+        // Backward from high 3: fall 2, rise 1, fall 0.
+        assert_eq!([3, 2, 1, 0].map(|c| rising_edges(c, true)), [3, 3, 1, 1]);
+        assert_eq!(rising_edges(0, false), u16::MAX);
+    }
+}

@@ -1,0 +1,280 @@
+//! Interlocks: what dumps the brake, checked on every sample before anything else.
+//!
+//! A condition counts from the first sample on which it is true as written here; the brake is dumped on
+//! that same sample.
+//!
+//! | fault | condition |
+//! |---|---|
+//! | `EmergencyStop` | its loop is open |
+//! | `WheelLocked` | wheel surface below 3 % of a vehicle speed above 5 m/s for more than 0.2 s, counted from the last pulse |
+//! | `Overspeed` | vehicle or wheel above its limit |
+//! | `WheelSensorLost` | no pulse for so long that the wheel would have slowed faster than brake and tyre can |
+//! | `WheelSensorOutOfRange` | speed changed faster than that with pulses, or is backwards |
+//! | `VehicleSensorLost`, `VehicleSensorOutOfRange` | the same of the vehicle, which cannot change by more than 30 m/s² |
+//! | `BridgeLost` | no answer, wrong checksum, or the converter reset itself |
+//! | `BridgeFrozen` | no conversion since the last sample, or both codes the same for the fifth time |
+//! | `BridgeOutOfRange` | code within 0.4 % of the end of the scale, or force beyond its limit |
+//! | `NormalForceLost` | below its limit |
+//! | `LinkSilent` | no whole frame from the host for 250 ms |
+//! | `EstimatorFault` | the filter refused an update or is not finite |
+//! | `DeadlineMissed` | a sample was not taken in time, or its work took longer than a sample |
+//! | `BrownOut` | supply of the valves below its limit |
+//! | `Watchdog` | the independent watchdog caused the last reset; until cleared |
+//! | `Clock` | the core does not run at its full clock; for good |
+//! | `Timeout` | a state lasted longer than it may, see [`sequence`](crate::sequence) |
+
+use muslip_record::{Fault, Parameters};
+
+use crate::SAMPLE_S;
+use crate::board::{BridgeQuality, RawSample};
+use crate::conversion::Converted;
+use crate::encoder::Speed;
+
+/// Vehicle speed in m/s above which a locked wheel is a fault.
+pub const LOCK_SPEED_M_S: f32 = 5.0;
+/// How long a wheel may be locked in s. A locked aircraft tyre blows after about a third of a second.
+pub const LOCK_TIME_S: f32 = 0.2;
+/// Share of the vehicle speed below which the wheel's surface counts as locked.
+pub const LOCKED_SHARE: f32 = 0.03;
+/// Samples without a whole frame after which the link is silent.
+pub const SILENT_SAMPLES: u32 = 250;
+/// The same pair of 24-bit codes this often is no measurement.
+pub const FROZEN_SAMPLES: u8 = 5;
+/// Magnitude of a code from which a channel is at the end of its scale.
+pub const LARGEST_CODE: u32 = 0x7F_8000;
+/// Change of speed in a sample that noise and the quantum of one pulse may make, in rad/s.
+const SPEED_NOISE_RAD_S: f32 = 5.0;
+/// Fastest change of a vehicle's speed in m/s².
+const VEHICLE_CHANGE_M_S2: f32 = 30.0;
+/// Backward speed that is still noise, in rad/s.
+const BACKWARD_RAD_S: f32 = 1.0;
+
+/// A set of faults.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct FaultSet(u32);
+
+/// In the order of their numbers, which is the order in which they are named.
+const ALL: [Fault; 18] = [
+    Fault::EmergencyStop,
+    Fault::WheelLocked,
+    Fault::Overspeed,
+    Fault::WheelSensorLost,
+    Fault::WheelSensorOutOfRange,
+    Fault::VehicleSensorLost,
+    Fault::VehicleSensorOutOfRange,
+    Fault::BridgeLost,
+    Fault::BridgeFrozen,
+    Fault::BridgeOutOfRange,
+    Fault::NormalForceLost,
+    Fault::LinkSilent,
+    Fault::EstimatorFault,
+    Fault::DeadlineMissed,
+    Fault::BrownOut,
+    Fault::Watchdog,
+    Fault::Clock,
+    Fault::Timeout,
+];
+
+impl FaultSet {
+    /// Adds a fault where a condition holds.
+    pub fn add_if(&mut self, holds: bool, fault: Fault) {
+        if holds {
+            self.0 |= 1 << fault as u8;
+        }
+    }
+
+    /// Takes a fault out.
+    pub fn without(self, fault: Fault) -> Self {
+        Self(self.0 & !(1 << fault as u8))
+    }
+
+    /// Whether a fault is in it.
+    pub fn contains(self, fault: Fault) -> bool {
+        self.0 & (1 << fault as u8) != 0
+    }
+
+    /// The fault that is named first.
+    pub fn first(self) -> Option<Fault> {
+        ALL.into_iter().find(|&fault| self.contains(fault))
+    }
+
+    /// One bit for each fault.
+    pub fn bits(self) -> u32 {
+        self.0
+    }
+}
+
+/// What the controller knows beside the sample.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Circumstances {
+    /// Samples since the last whole frame from the host.
+    pub silent_samples: u32,
+    /// The filter failed on the sample before.
+    pub estimator_failed: bool,
+    /// The sample before took longer than a sample.
+    pub overran: bool,
+    /// The watchdog caused the reset and nobody has cleared that yet.
+    pub watchdog_reset: bool,
+    /// The core does not run at its full clock.
+    pub slow_clock: bool,
+    /// A state lasted too long.
+    pub timed_out: bool,
+}
+
+/// The interlocks' limits and memory.
+#[derive(Debug, Clone, Copy)]
+pub struct Interlocks {
+    parameters: Parameters,
+    /// Fastest change of the wheel's speed in rad/s².
+    wheel_change_rad_s2: f32,
+    vehicle_change_rad_s2: f32,
+    locked_s: f32,
+    last_wheel_rad_s: f32,
+    last_vehicle_rad_s: f32,
+    last_codes: [i32; 2],
+    repeats: u8,
+}
+
+impl Interlocks {
+    /// With these parameters' limits.
+    pub fn new(parameters: &Parameters) -> Self {
+        let wheel = &parameters.wheel;
+        // Brake at full torque with half as much again, and the tyre at a friction of 1.5.
+        let torque_nm = 1.5
+            * (parameters.brake.torque_at_full_nm
+                + parameters.limits.maximum_force_n * wheel.effective_radius_m);
+        Self {
+            parameters: *parameters,
+            wheel_change_rad_s2: torque_nm / wheel.inertia_kg_m2,
+            vehicle_change_rad_s2: VEHICLE_CHANGE_M_S2 / parameters.vehicle_encoder_radius_m,
+            locked_s: 0.0,
+            last_wheel_rad_s: 0.0,
+            last_vehicle_rad_s: 0.0,
+            last_codes: [i32::MIN; 2],
+            repeats: 0,
+        }
+    }
+
+    /// Every condition that holds at this sample, whatever the state.
+    pub fn check(
+        &mut self,
+        raw: &RawSample,
+        converted: &Converted,
+        circumstances: &Circumstances,
+    ) -> FaultSet {
+        let mut faults = FaultSet::default();
+        faults.add_if(raw.emergency_stop, Fault::EmergencyStop);
+        self.speeds(converted, &mut faults);
+        self.bridge(raw, converted, &mut faults);
+        faults.add_if(
+            circumstances.silent_samples > SILENT_SAMPLES,
+            Fault::LinkSilent,
+        );
+        faults.add_if(circumstances.estimator_failed, Fault::EstimatorFault);
+        faults.add_if(circumstances.overran || raw.late, Fault::DeadlineMissed);
+        let supply_v = f32::from(raw.supply_mv) * 0.001;
+        faults.add_if(
+            supply_v < self.parameters.limits.minimum_supply_v,
+            Fault::BrownOut,
+        );
+        faults.add_if(circumstances.watchdog_reset, Fault::Watchdog);
+        faults.add_if(circumstances.slow_clock, Fault::Clock);
+        faults.add_if(circumstances.timed_out, Fault::Timeout);
+        faults
+    }
+
+    fn speeds(&mut self, converted: &Converted, faults: &mut FaultSet) {
+        let limits = &self.parameters.limits;
+        let wheel_rad_s = converted.wheel.rad_s;
+        let vehicle_m_s = converted.sample.vehicle_speed_m_s;
+
+        let surface_m_s = wheel_rad_s * self.parameters.wheel.effective_radius_m;
+        if vehicle_m_s > LOCK_SPEED_M_S && surface_m_s < LOCKED_SHARE * vehicle_m_s {
+            self.locked_s = (self.locked_s + SAMPLE_S).max(converted.wheel.age_s);
+        } else {
+            self.locked_s = 0.0;
+        }
+        faults.add_if(self.locked_s > LOCK_TIME_S, Fault::WheelLocked);
+
+        faults.add_if(
+            vehicle_m_s > limits.maximum_vehicle_speed_m_s
+                || wheel_rad_s > limits.maximum_wheel_speed_rad_s,
+            Fault::Overspeed,
+        );
+
+        let wheel = plausible(
+            &converted.wheel,
+            self.last_wheel_rad_s,
+            self.wheel_change_rad_s2,
+        );
+        faults.add_if(wheel == Plausible::Lost, Fault::WheelSensorLost);
+        faults.add_if(wheel == Plausible::OutOfRange, Fault::WheelSensorOutOfRange);
+        self.last_wheel_rad_s = wheel_rad_s;
+        let vehicle = plausible(
+            &converted.vehicle,
+            self.last_vehicle_rad_s,
+            self.vehicle_change_rad_s2,
+        );
+        faults.add_if(vehicle == Plausible::Lost, Fault::VehicleSensorLost);
+        faults.add_if(
+            vehicle == Plausible::OutOfRange,
+            Fault::VehicleSensorOutOfRange,
+        );
+        self.last_vehicle_rad_s = converted.vehicle.rad_s;
+    }
+
+    fn bridge(&mut self, raw: &RawSample, converted: &Converted, faults: &mut FaultSet) {
+        let limits = &self.parameters.limits;
+        let codes = raw.bridge.codes;
+        if codes == self.last_codes {
+            self.repeats = self.repeats.saturating_add(1);
+        } else {
+            self.repeats = 1;
+            self.last_codes = codes;
+        }
+        faults.add_if(raw.bridge.quality == BridgeQuality::Bad, Fault::BridgeLost);
+        faults.add_if(
+            raw.bridge.quality == BridgeQuality::Stale || self.repeats >= FROZEN_SAMPLES,
+            Fault::BridgeFrozen,
+        );
+        let ends = codes.iter().any(|code| code.unsigned_abs() >= LARGEST_CODE);
+        let sample = &converted.sample;
+        let beyond = [sample.drag_force_n, sample.normal_force_n]
+            .iter()
+            .any(|force| force.abs() > limits.maximum_force_n);
+        faults.add_if(ends || beyond, Fault::BridgeOutOfRange);
+        faults.add_if(
+            sample.normal_force_n < limits.minimum_normal_force_n,
+            Fault::NormalForceLost,
+        );
+    }
+}
+
+#[derive(PartialEq, Eq)]
+enum Plausible {
+    Yes,
+    Lost,
+    OutOfRange,
+}
+
+/// Whether a speed can have come from the one before it by a change of at most `change_rad_s2`.
+fn plausible(speed: &Speed, last_rad_s: f32, change_rad_s2: f32) -> Plausible {
+    if !speed.pulsed {
+        // Noise of 5 rad/s and a tenth cover the quantum of a coarse tone ring.
+        let slowest =
+            0.9 * speed.at_last_pulse_rad_s - SPEED_NOISE_RAD_S - change_rad_s2 * speed.age_s;
+        return if speed.rad_s < slowest {
+            Plausible::Lost
+        } else {
+            Plausible::Yes
+        };
+    }
+    // The pulses span up to one sample more than the samples they are read at.
+    let largest = SPEED_NOISE_RAD_S + 0.1 * last_rad_s.abs() + change_rad_s2 * 2.0 * SAMPLE_S;
+    let change = (speed.rad_s - last_rad_s).abs();
+    if change > largest || speed.rad_s < -BACKWARD_RAD_S {
+        Plausible::OutOfRange
+    } else {
+        Plausible::Yes
+    }
+}

@@ -1,0 +1,38 @@
+//! The rig controller above its registers.
+//!
+//! ```text
+//! interrupt   Sensors::read -> RawSample -> queue                                  board
+//! main loop   Controller::control    counts and codes to SI units                  conversion, encoder
+//!                                    interlocks, before anything else              interlock
+//!                                    state machine, brake demand                   sequence
+//!                                    slip, friction, filter                        estimation
+//!             Actuators::actuate     valve and dump valve                          board, brake
+//!             Controller::communicate  commands in, telemetry out                  controller, link
+//! ```
+//!
+//! Everything here is pure of registers and clocks: a sample goes in, the brake's outputs come out, and the
+//! same arithmetic runs on the chip, in the emulator and natively beside it. Drivers are generic over
+//! `embedded-hal` 1.0 ([`ads131m02`]) and `embedded-storage` ([`store`]).
+#![no_std]
+#![forbid(unsafe_code)]
+#![cfg_attr(not(test), deny(clippy::indexing_slicing))]
+
+pub mod ads131m02;
+pub mod board;
+pub mod brake;
+pub mod controller;
+pub mod conversion;
+pub mod emulation;
+pub mod encoder;
+pub mod estimation;
+pub mod interlock;
+pub mod link;
+pub mod sequence;
+pub mod store;
+pub mod validate;
+
+/// Seconds from one sample to the next.
+pub const SAMPLE_S: f32 = 0.001;
+
+/// Ticks a second of the timers that stamp encoder edges: APB1's timer clock at full core clock.
+pub const EDGE_TIMER_HZ: u32 = 84_000_000;

@@ -1,0 +1,156 @@
+//! Parameters and profiles are checked as a whole before any of them is taken.
+
+use muslip_record::{Parameters, Profile, Program};
+
+use crate::interlock::LOCK_SPEED_M_S;
+
+/// The first field outside its range, in the order of the type's fields counted from 0.
+///
+/// # Errors
+/// That number.
+pub fn parameters(p: &Parameters) -> Result<(), u8> {
+    let within = |value: f32, low: f32, high: f32| value >= low && value <= high;
+    let positive = |value: f32| value > 0.0 && value.is_finite();
+    let pulses = |pulses: u16| (1..=10_000).contains(&pulses);
+    let scale = |scale: f32| scale != 0.0 && scale.is_finite();
+    let code = |code: i32| code.unsigned_abs() < 1 << 23;
+    let checks = [
+        within(p.wheel.effective_radius_m, 0.005, 2.0),
+        positive(p.wheel.inertia_kg_m2),
+        positive(p.wheel.vehicle_mass_kg),
+        pulses(p.wheel_encoder.pulses_per_revolution),
+        true,
+        pulses(p.vehicle_encoder.pulses_per_revolution),
+        true,
+        within(p.vehicle_encoder_radius_m, 0.005, 10.0),
+        scale(p.drag.newton_per_code),
+        code(p.drag.zero_code),
+        scale(p.normal.newton_per_code),
+        code(p.normal.zero_code),
+        p.brake.duty_at_zero >= 0.0,
+        p.brake.duty_at_full > p.brake.duty_at_zero && p.brake.duty_at_full <= 1.0,
+        positive(p.brake.torque_at_full_nm),
+        positive(p.limits.maximum_vehicle_speed_m_s),
+        positive(p.limits.maximum_wheel_speed_rad_s),
+        positive(p.limits.minimum_normal_force_n),
+        positive(p.limits.maximum_force_n)
+            && p.limits.maximum_force_n > p.limits.minimum_normal_force_n,
+        positive(p.limits.minimum_supply_v),
+        true,
+        positive(p.estimator.friction_std),
+        positive(p.estimator.noise_inflation),
+        p.estimator.skid_slip_minimum >= 0.0,
+        p.estimator.skid_slip_maximum > p.estimator.skid_slip_minimum
+            && p.estimator.skid_slip_maximum <= 1.05,
+        positive(p.slip_control.bandwidth_rad_s),
+        positive(p.slip_control.integral_time_s),
+        positive(p.slip_control.maximum_torque_rate_nm_s),
+    ];
+    match checks.iter().position(|&good| !good) {
+        Some(index) => Err(index as u8),
+        None => Ok(()),
+    }
+}
+
+/// Whether every field of a profile is within its range.
+pub fn profile(profile: &Profile) -> bool {
+    let within = |value: f32, low: f32, high: f32| value >= low && value <= high;
+    let program = match &profile.program {
+        Program::Ramp { demand_per_s } => *demand_per_s > 0.0 && *demand_per_s <= 10.0,
+        Program::Steps {
+            levels,
+            count,
+            hold_s,
+        } => {
+            (1..=levels.len()).contains(&usize::from(*count))
+                && within(*hold_s, 0.01, 60.0)
+                && levels.iter().all(|&level| within(level, 0.0, 1.0))
+        }
+        Program::SlipHold {
+            target_slip,
+            hold_s,
+        } => within(*target_slip, 0.01, 0.5) && within(*hold_s, 0.01, 60.0),
+    };
+    program
+        && profile.start_speed_m_s > LOCK_SPEED_M_S
+        && profile.start_speed_m_s.is_finite()
+        && within(profile.skid_slip, 0.05, 1.0)
+        && within(profile.skid_hold_s, 0.0, 0.15)
+        && (1..=100).contains(&profile.applications)
+        && within(profile.cool_s, 0.1, 600.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn defaults_pass_and_the_first_bad_field_is_named() {
+        let good = Parameters::default();
+        assert_eq!(parameters(&good), Ok(()));
+        let refused = |change: fn(&mut Parameters)| {
+            let mut changed = Parameters::default();
+            change(&mut changed);
+            parameters(&changed)
+        };
+        assert_eq!(refused(|p| p.wheel.effective_radius_m = f32::NAN), Err(0));
+        assert_eq!(
+            refused(|p| p.wheel_encoder.pulses_per_revolution = 0),
+            Err(3)
+        );
+        assert_eq!(refused(|p| p.normal.zero_code = i32::MIN), Err(11));
+        assert_eq!(refused(|p| p.brake.duty_at_full = 0.05), Err(13));
+        assert_eq!(refused(|p| p.limits.maximum_force_n = 1.0), Err(18));
+        assert_eq!(refused(|p| p.estimator.friction_std = 0.0), Err(21));
+        assert_eq!(
+            refused(|p| p.slip_control.integral_time_s = f32::INFINITY),
+            Err(26)
+        );
+    }
+
+    #[test]
+    fn profiles_outside_their_ranges_are_refused() {
+        let good = Profile {
+            program: Program::Ramp { demand_per_s: 0.5 },
+            start_speed_m_s: 20.0,
+            skid_slip: 0.5,
+            skid_hold_s: 0.05,
+            applications: 1,
+            cool_s: 1.0,
+        };
+        assert!(profile(&good));
+        assert!(!profile(&Profile {
+            start_speed_m_s: 5.0,
+            ..good
+        }));
+        assert!(!profile(&Profile {
+            skid_hold_s: 0.2,
+            ..good
+        }));
+        assert!(!profile(&Profile {
+            skid_slip: f32::NAN,
+            ..good
+        }));
+        assert!(!profile(&Profile {
+            applications: 0,
+            ..good
+        }));
+        let with = |program| profile(&Profile { program, ..good });
+        assert!(!with(Program::Ramp { demand_per_s: 0.0 }));
+        let levels = [0.5; muslip_record::STEPS];
+        assert!(with(Program::Steps {
+            levels,
+            count: 8,
+            hold_s: 1.0
+        }));
+        assert!(!with(Program::Steps {
+            levels,
+            count: 9,
+            hold_s: 1.0
+        }));
+        assert!(!with(Program::SlipHold {
+            target_slip: 0.6,
+            hold_s: 1.0
+        }));
+    }
+}

@@ -1,0 +1,226 @@
+//! A power cut at any write or erase leaves the old parameters or the new ones, never a mix.
+#![allow(clippy::unwrap_used, reason = "a failed step fails the test")]
+
+use embedded_storage::nor_flash::{
+    ErrorType, NorFlash, NorFlashError, NorFlashErrorKind, ReadNorFlash,
+};
+use muslip_control::store::{SLOT_BYTES, Store};
+use muslip_record::Parameters;
+
+/// Sectors of eight slots, so that a test goes round often.
+const SECTOR: usize = 8 * SLOT_BYTES;
+
+/// Flash that loses power after a number of words or erase steps, and does what real flash does: bits go
+/// from 1 to 0 by word, and from 0 to 1 by sector.
+#[derive(Clone)]
+struct Flash {
+    bytes: Vec<u8>,
+    /// Operations until the power is cut.
+    left: usize,
+    /// How a torn word or sector looks.
+    torn: Torn,
+    operations: usize,
+}
+
+#[derive(Clone, Copy, Debug)]
+enum Torn {
+    /// The word as it was; the sector half erased.
+    Untouched,
+    /// Half of the bits done; the sector all erased but for its end.
+    Half,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct PowerCut;
+
+impl NorFlashError for PowerCut {
+    fn kind(&self) -> NorFlashErrorKind {
+        NorFlashErrorKind::Other
+    }
+}
+
+impl Flash {
+    fn blank() -> Self {
+        Self {
+            bytes: vec![0xFF; 2 * SECTOR],
+            left: usize::MAX,
+            torn: Torn::Half,
+            operations: 0,
+        }
+    }
+
+    fn cut(&mut self) -> bool {
+        self.operations += 1;
+        self.left = self.left.saturating_sub(1);
+        self.left == 0
+    }
+}
+
+impl ErrorType for Flash {
+    type Error = PowerCut;
+}
+
+impl ReadNorFlash for Flash {
+    const READ_SIZE: usize = 1;
+    fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), PowerCut> {
+        if self.left == 0 {
+            return Err(PowerCut);
+        }
+        bytes.copy_from_slice(&self.bytes[offset as usize..][..bytes.len()]);
+        Ok(())
+    }
+    fn capacity(&self) -> usize {
+        self.bytes.len()
+    }
+}
+
+impl NorFlash for Flash {
+    const WRITE_SIZE: usize = 4;
+    const ERASE_SIZE: usize = SECTOR;
+
+    fn erase(&mut self, from: u32, to: u32) -> Result<(), PowerCut> {
+        if self.left == 0 {
+            return Err(PowerCut);
+        }
+        let (from, mut to) = (from as usize, to as usize);
+        assert!(from % SECTOR == 0 && to == from + SECTOR);
+        let cut = self.cut();
+        if cut {
+            to = match self.torn {
+                Torn::Untouched => from + SECTOR / 2,
+                Torn::Half => to - 3,
+            };
+        }
+        self.bytes[from..to].fill(0xFF);
+        if cut { Err(PowerCut) } else { Ok(()) }
+    }
+
+    fn write(&mut self, offset: u32, bytes: &[u8]) -> Result<(), PowerCut> {
+        assert!(offset.is_multiple_of(4) && bytes.len().is_multiple_of(4));
+        for (index, word) in bytes.chunks(4).enumerate() {
+            if self.left == 0 {
+                return Err(PowerCut);
+            }
+            let cut = self.cut();
+            for (place, &byte) in self.bytes[offset as usize + 4 * index..]
+                .iter_mut()
+                .zip(word)
+            {
+                let written = match (cut, self.torn) {
+                    (false, _) => byte,
+                    (true, Torn::Untouched) => 0xFF,
+                    (true, Torn::Half) => byte | 0x5A,
+                };
+                *place &= written;
+            }
+            if cut {
+                return Err(PowerCut);
+            }
+        }
+        Ok(())
+    }
+}
+
+fn numbered(number: u16) -> Parameters {
+    let mut parameters = Parameters::default();
+    parameters.wheel_encoder.pulses_per_revolution = number;
+    parameters.drag.zero_code = i32::from(number) * 1000;
+    parameters
+}
+
+fn loaded(flash: &Flash) -> Option<Parameters> {
+    let flash = Flash {
+        left: usize::MAX,
+        ..flash.clone()
+    };
+    Store::new(flash).load().unwrap()
+}
+
+#[test]
+fn a_blank_flash_holds_nothing_and_the_last_save_counts() {
+    let mut flash = Flash::blank();
+    assert_eq!(loaded(&flash), None);
+    for number in 1..50 {
+        let mut store = Store::new(flash);
+        store.save(&numbered(number)).unwrap();
+        assert_eq!(store.load(), Ok(Some(numbered(number))));
+        flash = store.into_inner();
+    }
+}
+
+#[test]
+fn a_cut_at_every_operation_of_every_save_leaves_the_old_or_the_new_whole() {
+    let mut cuts = 0;
+    for torn in [Torn::Untouched, Torn::Half] {
+        let mut flash = Flash {
+            torn,
+            ..Flash::blank()
+        };
+        // Far enough to fill both sectors and erase each of them.
+        for number in 1..30_u16 {
+            let old = loaded(&flash);
+            let new = Some(numbered(number));
+            let mut whole = Store::new(Flash {
+                operations: 0,
+                ..flash.clone()
+            });
+            whole.save(&numbered(number)).unwrap();
+            let whole = whole.into_inner();
+            for left in 1..=whole.operations {
+                let mut store = Store::new(Flash {
+                    left,
+                    ..flash.clone()
+                });
+                assert!(store.save(&numbered(number)).is_err());
+                let mut cut = store.into_inner();
+                let found = loaded(&cut);
+                assert!(
+                    found == old || found == new,
+                    "{torn:?} save {number} cut {left}"
+                );
+                cuts += 1;
+                // And saving works again after it, cut once more in the same place or not.
+                cut.left = usize::MAX;
+                let mut again = Store::new(cut);
+                again.save(&numbered(number)).unwrap();
+                assert_eq!(again.load(), Ok(new));
+            }
+            flash = whole;
+        }
+    }
+    println!("{cuts} cuts");
+    assert!(cuts > 3000);
+}
+
+#[test]
+fn cuts_one_after_the_other_do_not_add_up() {
+    let mut flash = Flash::blank();
+    let mut store = Store::new(flash);
+    store.save(&numbered(1)).unwrap();
+    flash = store.into_inner();
+    for round in 0..200 {
+        let mut store = Store::new(Flash {
+            left: 1 + round % 70,
+            ..flash
+        });
+        let saved = store.save(&numbered(2));
+        flash = Flash {
+            left: usize::MAX,
+            ..store.into_inner()
+        };
+        let found = loaded(&flash);
+        assert!(
+            found == Some(numbered(1)) || found == Some(numbered(2)),
+            "{round} {saved:?}"
+        );
+    }
+}
+
+#[test]
+fn whole_slots_with_parameters_outside_their_ranges_are_not_taken() {
+    let mut store = Store::new(Flash::blank());
+    let mut bad = numbered(3);
+    bad.wheel.effective_radius_m = -1.0;
+    store.save(&bad).unwrap();
+    assert_eq!(store.load(), Ok(None));
+}
