@@ -98,6 +98,7 @@
 )]
 
 pub mod compensate;
+pub mod control;
 pub mod filter;
 pub mod law;
 pub mod real;

@@ -6,6 +6,7 @@
 //! as its [`Estimator::Measurement`].
 
 pub mod mu_slip;
+pub mod quarter_car;
 
 use crate::real::Real;
 
