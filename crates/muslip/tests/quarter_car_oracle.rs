@@ -1,9 +1,6 @@
 //! The quarter-car filter against dense matrices, automatic derivatives and a literal transcription of the
 //! tutorial's code.
-#![expect(
-    clippy::unwrap_used,
-    reason = "a failed step fails the test"
-)]
+#![expect(clippy::unwrap_used, reason = "a failed step fails the test")]
 
 use muslip::filter::quarter_car::{
     Channel, Config, Covariance, Estimate, Measurement, Motion, QuarterCarFilter, Road, State,

@@ -1,8 +1,5 @@
 //! What the quarter-car filter does with inputs and situations that the tutorial leaves out.
-#![expect(
-    clippy::unwrap_used,
-    reason = "a failed step fails the test"
-)]
+#![expect(clippy::unwrap_used, reason = "a failed step fails the test")]
 
 use muslip::filter::mu_slip::Decision;
 use muslip::filter::quarter_car::{
