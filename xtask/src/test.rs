@@ -7,6 +7,7 @@ use anyhow::{Context, Result, bail};
 
 use crate::setup::{self, TARGETS};
 use crate::step::{cargo, run, step};
+use crate::trial;
 
 /// Packages whose `#[ignore]`d tests are long rather than broken: run in release.
 const LONG_TESTS: &[&str] = &["muslip"];
@@ -55,6 +56,8 @@ pub fn run_all() -> Result<()> {
             "--no-fail-fast",
         ]),
     )?;
+
+    trial::small()?;
 
     for target in TARGETS {
         for features in CORE_FEATURES {

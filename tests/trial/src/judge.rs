@@ -76,7 +76,10 @@ pub struct Case {
     /// The same over all balances.
     pub iou_all: Option<f64>,
     pub local: bool,
+    /// Wall time of `diagnose` on one thread, s.
     pub seconds: f64,
+    /// Its processor time, s.
+    pub processor_s: f64,
     pub samples: usize,
     pub complaints: Vec<String>,
 }
@@ -302,7 +305,8 @@ pub fn judge(campaigns: &Path, truth: &Truth, answer: &Answer) -> Result<Case> {
         local,
         named,
         unexplained,
-        seconds: answer.seconds,
+        seconds: answer.cost.wall_s,
+        processor_s: answer.cost.processor_s,
         samples: answer.samples,
         complaints: answer.complaints.clone(),
     })

@@ -7,6 +7,7 @@
 
 mod baseline;
 mod campaign;
+mod cause;
 mod chain;
 #[cfg(test)]
 mod checks;
@@ -18,9 +19,13 @@ mod files;
 mod form;
 mod judge;
 mod measure;
+mod measured;
 mod noise;
 mod oracle;
+mod pace;
+mod pages;
 mod plan;
+mod process;
 mod rig;
 mod score;
 mod sim;

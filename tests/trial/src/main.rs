@@ -91,25 +91,37 @@ enum Command {
         out: Option<PathBuf>,
     },
     /// Generate from a fresh seed, score, and write the pages.
-    Run {
-        #[command(flatten)]
-        tool: ToolArguments,
-        /// Seed of every draw; development uses seeds below 1000.
-        #[arg(long, default_value_t = 20_260)]
-        seed: u64,
-        /// A few campaigns only, and no pages unless a directory is given.
-        #[arg(long)]
-        small: bool,
-        /// Scratch directory.
-        #[arg(long, default_value = "target/trial")]
-        work: PathBuf,
-        /// Directory of the pages.
-        #[arg(long)]
-        pages: Option<PathBuf>,
-        /// Write everything to this file.
-        #[arg(long)]
-        out: Option<PathBuf>,
-    },
+    Run(RunArguments),
+}
+
+#[derive(Args)]
+struct RunArguments {
+    #[command(flatten)]
+    tool: ToolArguments,
+    /// Seed of every draw; development uses seeds below 1000.
+    #[arg(long, default_value_t = 20_260)]
+    seed: u64,
+    /// A few campaigns only, with loose bars that must hold; no pages unless a directory is given.
+    #[arg(long)]
+    small: bool,
+    /// Campaigns as a share of the full trial's 120 null, 405 single, 80 pair and 85 outside.
+    #[arg(long, default_value_t = 1.0)]
+    scale: f64,
+    /// Scratch directory; a trial that was stopped goes on from what is there.
+    #[arg(long, default_value = "target/trial")]
+    work: PathBuf,
+    /// Directory of trials.md and trials/; docs unless the trial is small.
+    #[arg(long)]
+    out: Option<PathBuf>,
+    /// Directory of measured recordings.
+    #[arg(long, default_value = "../shared/data")]
+    data: PathBuf,
+    /// Diagnose every so manieth campaign without each part of the argument as well; 0: none.
+    #[arg(long, default_value_t = 4)]
+    ablate_every: usize,
+    /// Write every judged campaign to this file as JSON.
+    #[arg(long)]
+    json: Option<PathBuf>,
 }
 
 fn main() -> Result<()> {
@@ -155,6 +167,7 @@ fn main() -> Result<()> {
                 jobs: tool.jobs,
                 baselines,
                 reuse,
+                every: 1,
             })?;
             print!("{}", report.lines(only_failures));
             if !terse {
@@ -164,25 +177,23 @@ fn main() -> Result<()> {
                 report.write(&path)?;
             }
         }
-        Command::Run {
-            tool,
-            seed,
-            small,
-            work,
-            pages,
-            out,
-        } => {
-            let pages = pages.or_else(|| (!small).then(|| PathBuf::from("docs/trials")));
+        Command::Run(run) => {
+            let pages = run
+                .out
+                .or_else(|| (!run.small).then(|| PathBuf::from("docs")));
             let report = trial(&Trial {
-                tool: tool.tool(),
-                seed,
-                small,
-                work,
+                tool: run.tool.tool(),
+                seed: run.seed,
+                small: run.small,
+                scale: run.scale,
+                work: run.work,
                 pages,
-                jobs: tool.jobs,
+                data: run.data,
+                jobs: run.tool.jobs,
+                ablate_every: run.ablate_every,
             })?;
             print!("{}", report.text());
-            if let Some(path) = out {
+            if let Some(path) = run.json {
                 report.write(&path)?;
             }
         }

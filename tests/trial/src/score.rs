@@ -33,13 +33,15 @@ pub struct ScoreRequest {
     pub baselines: bool,
     /// Judge the answers of an earlier call instead of calling the tool.
     pub reuse: bool,
+    /// Only every so manieth campaign, by its number, which says nothing of what it conceals.
+    pub every: usize,
 }
 
 /// The judged trial.
 #[derive(Clone, Debug)]
 pub struct Report {
     pub(crate) cases: Vec<Case>,
-    baselines: Vec<(Truth, Verdicts)>,
+    pub(crate) baselines: Vec<(Truth, Verdicts)>,
 }
 
 /// Has every campaign diagnosed, then opens the truth and judges.
@@ -69,6 +71,12 @@ pub fn score(request: &ScoreRequest) -> Result<Report> {
             })
         });
     }
+    let every = request.every.max(1);
+    let mut number = 0;
+    chosen.retain(|_| {
+        number += 1;
+        (number - 1) % every == 0
+    });
     let pool = rayon::ThreadPoolBuilder::new()
         .num_threads(request.jobs.max(1))
         .build()
@@ -85,7 +93,10 @@ pub fn score(request: &ScoreRequest) -> Result<Report> {
                     let answer = request
                         .tool
                         .answer(&request.campaigns, name, &request.results)?;
-                    fs::write(&kept, serde_json::to_string(&answer)?)?;
+                    // Under its name only when it is whole, so that a trial that was stopped goes on from here.
+                    let part = kept.with_extension("part");
+                    fs::write(&part, serde_json::to_string(&answer)?)?;
+                    fs::rename(&part, &kept)?;
                     answer
                 };
                 let count = done.fetch_add(1, Ordering::Relaxed) + 1;
@@ -162,34 +173,6 @@ impl Report {
             text.push_str(&tally::baselines(cases, &self.baselines).text());
         }
         text.push_str(&tally::bars(cases).text());
-        text
-    }
-
-    /// The page of the documentation.
-    pub fn markdown(&self, introduction: &str) -> String {
-        let cases = &self.cases;
-        let mut text = introduction.to_owned();
-        for table in [
-            tally::bars(cases),
-            tally::nulls(cases),
-            tally::mechanisms(cases),
-            tally::strengths(cases),
-            tally::outside(cases),
-            tally::calibration(cases),
-            tally::confusion(cases),
-            tally::figures(cases, 20),
-        ] {
-            text.push_str(&table.markdown());
-        }
-        if !self.baselines.is_empty() {
-            text.push_str(&tally::baselines(cases, &self.baselines).markdown());
-        }
-        text.push_str("## The twenty worst cases\n\n```text\n");
-        for case in tally::worst(cases, 20) {
-            text.push_str(&case.line());
-            text.push('\n');
-        }
-        text.push_str("```\n");
         text
     }
 

@@ -70,7 +70,9 @@ impl Table {
         text.push_str(&line(&self.header));
         text.push_str(&line(&vec!["---".to_owned(); self.header.len()]));
         for row in &self.rows {
-            text.push_str(&line(row));
+            let mut row = row.clone();
+            row.resize(self.header.len(), String::new());
+            text.push_str(&line(&row));
         }
         if let Some(note) = &self.note {
             let _ = write!(text, "\n{note}\n");

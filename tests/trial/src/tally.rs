@@ -107,6 +107,23 @@ fn shares(cases: &[Case]) -> Vec<f64> {
         .collect()
 }
 
+/// Whether a bar is met, and whether the interval of the figure leaves no doubt of it.
+fn word(value: f64, bar: f64, at_least: bool, low: f64, high: f64) -> &'static str {
+    let met = (value - bar).abs() < 1e-12 || (value >= bar) == at_least;
+    let sure = if met == at_least {
+        low >= bar
+    } else {
+        high <= bar
+    };
+    // Met and at least: the whole interval above; missed and at least: the whole interval below; and the reverse.
+    match (met, sure) {
+        (true, true) => "met",
+        (true, false) => "met, interval spans the bar",
+        (false, true) => "**missed**",
+        (false, false) => "**missed**, interval spans the bar",
+    }
+}
+
 /// The figures of the trial beside their bars.
 pub fn bars(cases: &[Case]) -> Table {
     let mut table = Table::new(
@@ -114,14 +131,13 @@ pub fn bars(cases: &[Case]) -> Table {
         &["figure", "bar", "measured", "95 % interval", "n", "met"],
     );
     let mut proportion = |figure: &str, bar: f64, at_least: bool, share: Share| {
+        let [value, interval, n] = share.cells();
         let met = if share.of == 0 {
             "-"
-        } else if (share.value() >= bar) == at_least || (share.value() - bar).abs() < 1e-12 {
-            "yes"
         } else {
-            "NO"
+            let (low, high) = share.interval();
+            word(share.value(), bar, at_least, low, high)
         };
-        let [value, interval, n] = share.cells();
         table.row([
             figure.to_owned(),
             format!("{} {}", if at_least { ">=" } else { "<=" }, percent(bar)),
@@ -182,13 +198,16 @@ pub fn bars(cases: &[Case]) -> Table {
         Share::count(gains.iter(), |gain| gain.worse),
     );
     let mut number =
-        |figure: &str, bar: f64, at_least: bool, value: f64, interval: String, n: usize| {
+        |figure: &str, bar: f64, at_least: bool, value: f64, (low, high): (f64, f64), n: usize| {
             let met = if value.is_nan() {
                 "-"
-            } else if (value >= bar) == at_least {
-                "yes"
             } else {
-                "NO"
+                word(value, bar, at_least, low, high)
+            };
+            let interval = if low.is_finite() && high.is_finite() {
+                format!("{low:.3}..{high:.3}")
+            } else {
+                "-".to_owned()
             };
             table.row([
                 figure.to_owned(),
@@ -201,14 +220,7 @@ pub fn bars(cases: &[Case]) -> Table {
         };
     let with_error = |values: &[f64]| {
         let (mean, error) = mean(values);
-        (
-            mean,
-            if values.len() > 1 {
-                format!("{:.3}..{:.3}", mean - 1.96 * error, mean + 1.96 * error)
-            } else {
-                "-".into()
-            },
-        )
+        (mean, (mean - 1.96 * error, mean + 1.96 * error))
     };
     let f1: Vec<f64> = of(cases, "pair").map(|case| case.f1).collect();
     let (value, interval) = with_error(&f1);
@@ -225,10 +237,9 @@ pub fn bars(cases: &[Case]) -> Table {
         // Order statistics: the ranks that bracket the quantile.
         let n = gained.len() as f64;
         let half = 1.96 * (at * (1.0 - at) / n.max(1.0)).sqrt();
-        format!(
-            "{:.3}..{:.3}",
+        (
             quantile(&gained, (at - half).max(0.0)),
-            quantile(&gained, (at + half).min(1.0))
+            quantile(&gained, (at + half).min(1.0)),
         )
     };
     number(
@@ -258,19 +269,6 @@ pub fn bars(cases: &[Case]) -> Table {
         let (value, interval) = with_error(&overlaps);
         number(figure, bar, true, value, interval, overlaps.len());
     }
-    let paces: Vec<f64> = cases
-        .iter()
-        .filter(|case| case.samples > 0)
-        .map(|case| case.seconds * 30_000.0 / case.samples as f64)
-        .collect();
-    number(
-        "seconds for 30,000 samples, one thread, median",
-        4.0,
-        false,
-        quantile(&paces, 0.5),
-        format!("max {:.2}", quantile(&paces, 1.0)),
-        paces.len(),
-    );
     table
 }
 
@@ -486,6 +484,56 @@ pub fn calibration(cases: &[Case]) -> Table {
     table
 }
 
+/// How far figures lie off in their own standard deviations, by mechanism.
+pub fn pulls(cases: &[Case]) -> Table {
+    let mut table = Table::new(
+        "Calibration of parameters",
+        &[
+            "figure",
+            "n",
+            "within 1 std",
+            "within 2",
+            "within 3",
+            "95 % interval of within 3",
+            "median error",
+            "median std, relative",
+        ],
+    );
+    let mut groups: BTreeMap<String, Vec<&crate::judge::FigureCase>> = BTreeMap::new();
+    for figure in cases.iter().flat_map(|case| &case.figures) {
+        for key in [
+            "(all)".to_owned(),
+            format!("{} {}", figure.mechanism, figure.name),
+        ] {
+            groups.entry(key).or_default().push(figure);
+        }
+    }
+    for (key, group) in groups {
+        let within = |limit: f64| Share::count(group.iter(), |figure| figure.pull.abs() <= limit);
+        let [three, interval, _] = within(3.0).cells();
+        let middle = |value: &dyn Fn(&crate::judge::FigureCase) -> f64| {
+            let values: Vec<f64> = group.iter().map(|figure| value(figure)).collect();
+            quantile(&values, 0.5)
+        };
+        let size = |figure: &crate::judge::FigureCase| figure.truth.abs().max(1e-12);
+        table.row([
+            key,
+            group.len().to_string(),
+            percent(within(1.0).value()),
+            percent(within(2.0).value()),
+            three,
+            interval,
+            percent(middle(&|f| (f.value - f.truth).abs() / size(f))),
+            percent(middle(&|f| f.std / size(f))),
+        ]);
+    }
+    table.note = Some(
+        "A normal error lies within 1, 2 and 3 of its standard deviations in 68, 95 and 99.7 % of cases. Error and std relative to the true figure."
+            .to_owned(),
+    );
+    table
+}
+
 /// What was named first for each truth: the full confusion matrix.
 pub fn confusion(cases: &[Case]) -> Table {
     let truth_of = |case: &Case| match case.stratum.as_str() {
@@ -646,6 +694,73 @@ pub fn baselines(cases: &[Case], verdicts: &[(Truth, Verdicts)]) -> Table {
         "-".to_owned(),
         share(Share::count(stratum("outside"), |pair| !pair.1.white)),
     ]);
+    table
+}
+
+/// The tool with parts of its argument left out, beside the whole on the same campaigns.
+pub fn ablations(rows: &[(String, std::result::Result<Vec<Case>, String>)]) -> Table {
+    let mut table = Table::new(
+        "Ablations",
+        &[
+            "left out",
+            "campaigns",
+            "false alarms",
+            "right first, single from 0.6 sigma",
+            "in set",
+            "pairs, F1",
+            "outside: says so",
+            "figures within 3 std",
+            "gain share, median",
+            "worst tenth",
+            "worse than base",
+        ],
+    );
+    for (name, cases) in rows {
+        let cases = match cases {
+            Ok(cases) => cases,
+            Err(why) => {
+                table.rows.push(vec![name.clone(), why.clone()]);
+                continue;
+            }
+        };
+        let share = |share: Share| {
+            if share.of == 0 {
+                "-".to_owned()
+            } else {
+                format!("{} ({}/{})", percent(share.value()), share.hits, share.of)
+            }
+        };
+        let number = |value: f64| {
+            if value.is_nan() {
+                "-".to_owned()
+            } else {
+                format!("{value:.2}")
+            }
+        };
+        let f1: Vec<f64> = of(cases, "pair").map(|case| case.f1).collect();
+        let gained = shares(cases);
+        table.row([
+            name.clone(),
+            cases.len().to_string(),
+            share(Share::count(of(cases, "null"), |case| {
+                case.verdict != "consistent"
+            })),
+            share(Share::count(strong(cases), |case| case.first_right)),
+            share(Share::count(strong(cases), |case| case.in_set)),
+            number(if f1.is_empty() { f64::NAN } else { mean(&f1).0 }),
+            share(Share::count(of(cases, "outside"), |case| case.honest)),
+            share(Share::count(
+                cases.iter().flat_map(|case| &case.figures),
+                |figure| figure.pull.abs() <= 3.0,
+            )),
+            number(quantile(&gained, 0.5)),
+            number(quantile(&gained, 0.1)),
+            share(Share::count(
+                cases.iter().flat_map(|case| &case.gains),
+                |gain| gain.worse,
+            )),
+        ]);
+    }
     table
 }
 

@@ -1,16 +1,18 @@
 //! The tool under trial, run as a user runs it: by its command line and its files.
 
-use std::fs::{self, File};
+use std::fs;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Stdio};
-use std::time::{Duration, Instant};
+use std::process::Command;
+use std::time::Duration;
 
 use anyhow::{Context, Result};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
+use crate::process::{Cost, run};
+
 /// Longest that one call may take.
-const PATIENCE: Duration = Duration::from_secs(180);
+pub const PATIENCE: Duration = Duration::from_secs(600);
 
 /// How to call the tool.
 #[derive(Clone, Debug)]
@@ -26,8 +28,8 @@ pub struct Tool {
 pub struct Answer {
     /// `diagnosis.json`, null where there is none.
     pub diagnosis: Value,
-    /// Seconds that `diagnose` took on one thread.
-    pub seconds: f64,
+    /// What `diagnose` took on one thread.
+    pub cost: Cost,
     /// Samples in the recordings that it read.
     pub samples: usize,
     /// What was wrong with the call or with the file that it wrote.
@@ -45,6 +47,31 @@ pub struct Prediction {
 }
 
 impl Tool {
+    /// Why the tool does not take its further arguments at all, if so.
+    ///
+    /// # Errors
+    /// Where the scratch directory cannot be written.
+    pub fn refusal(&self, work: &Path) -> Result<Option<String>> {
+        fs::create_dir_all(work).with_context(|| format!("cannot make {}", work.display()))?;
+        let mut command = Command::new(&self.path);
+        command
+            .args([
+                "diagnose",
+                "--rig",
+                "/nonexistent/rig.toml",
+                "--out",
+                "/nonexistent/out",
+            ])
+            .args(&self.diagnose_arguments)
+            .arg("/nonexistent/run.csv");
+        let (_, outcome) = run(command, 1, PATIENCE, &work.join("refusal.log"));
+        // One that takes the arguments complains of the files that are not there.
+        Ok(outcome
+            .err()
+            .filter(|why| !why.contains("nonexistent"))
+            .map(|why| format!("not taken: {why}")))
+    }
+
     /// Diagnoses a campaign and predicts its fresh runs; the sealed truth is not looked at.
     ///
     /// # Errors
@@ -73,12 +100,11 @@ impl Tool {
             .arg(&out)
             .args(&self.diagnose_arguments)
             .args(&runs);
-        let begin = Instant::now();
-        match call(command, &out.join("diagnose.log")) {
-            Ok(()) => {}
-            Err(complaint) => answer.complaints.push(format!("diagnose: {complaint}")),
+        let (cost, outcome) = run(command, 1, PATIENCE, &out.join("diagnose.log"));
+        if let Err(complaint) = outcome {
+            answer.complaints.push(format!("diagnose: {complaint}"));
         }
-        answer.seconds = begin.elapsed().as_secs_f64();
+        answer.cost = cost;
         match fs::read_to_string(out.join("diagnosis.json"))
             .map_err(|e| e.to_string())
             .and_then(|text| serde_json::from_str::<Value>(&text).map_err(|e| e.to_string()))
@@ -114,9 +140,12 @@ impl Tool {
                     command.arg("--base");
                 }
                 command.arg(&fresh);
-                let answered = call(command, &out.join("predict.log")).and_then(|()| {
-                    crate::files::read_column(&target, "drag_force_n").map_err(|e| e.to_string())
-                });
+                let answered = run(command, 1, PATIENCE, &out.join("predict.log"))
+                    .1
+                    .and_then(|()| {
+                        crate::files::read_column(&target, "drag_force_n")
+                            .map_err(|e| e.to_string())
+                    });
                 if let Err(complaint) = answered {
                     answer
                         .complaints
@@ -143,39 +172,4 @@ fn recordings(directory: &Path) -> Result<Vec<PathBuf>> {
         .collect();
     found.sort();
     Ok(found)
-}
-
-/// Runs a command on one thread, its words going to a log; the error is what to tell.
-fn call(mut command: Command, log: &Path) -> std::result::Result<(), String> {
-    let file = File::create(log).map_err(|e| e.to_string())?;
-    let copy = file.try_clone().map_err(|e| e.to_string())?;
-    let mut child = command
-        .env("RAYON_NUM_THREADS", "1")
-        .stdin(Stdio::null())
-        .stdout(Stdio::from(copy))
-        .stderr(Stdio::from(file))
-        .spawn()
-        .map_err(|e| format!("cannot start: {e}"))?;
-    let begin = Instant::now();
-    loop {
-        match child.try_wait() {
-            Ok(Some(status)) if status.success() => return Ok(()),
-            Ok(Some(status)) => {
-                let words = fs::read_to_string(log).unwrap_or_default();
-                let line = words
-                    .lines()
-                    .rfind(|line| !line.trim().is_empty())
-                    .unwrap_or("")
-                    .to_owned();
-                return Err(format!("{status}: {line}"));
-            }
-            Ok(None) if begin.elapsed() > PATIENCE => {
-                let _ = child.kill();
-                let _ = child.wait();
-                return Err(format!("still busy after {} s", PATIENCE.as_secs()));
-            }
-            Ok(None) => std::thread::sleep(Duration::from_millis(4)),
-            Err(error) => return Err(error.to_string()),
-        }
-    }
 }
