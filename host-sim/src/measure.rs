@@ -29,6 +29,8 @@ pub struct Skipped {
     pub low_normal_force: u64,
     /// Slip outside 0..=1 by more than the margin.
     pub slip_out_of_range: u64,
+    /// A delay is compensated, and the samples before do not reach back that far yet.
+    pub delay_line_filling: u64,
     /// The estimator refused the measurement.
     pub refused: u64,
 }
@@ -40,12 +42,13 @@ impl Skipped {
     }
 
     /// The reasons in words with their counts.
-    pub fn reasons(&self) -> [(&'static str, u64); 5] {
+    pub fn reasons(&self) -> [(&'static str, u64); 6] {
         [
             ("missing or not finite", self.not_finite),
             ("vehicle speed too low", self.low_speed),
             ("normal force too low", self.low_normal_force),
             ("slip outside 0 to 1", self.slip_out_of_range),
+            ("delay line filling", self.delay_line_filling),
             ("refused by the estimator", self.refused),
         ]
     }
@@ -60,7 +63,7 @@ impl Skipped {
             .join(", ")
     }
 
-    fn count(&mut self, error: SampleError) {
+    pub(crate) fn count(&mut self, error: SampleError) {
         match error {
             SampleError::LowSpeed => self.low_speed += 1,
             SampleError::LowNormalForce => self.low_normal_force += 1,
@@ -75,6 +78,7 @@ impl Skipped {
         self.low_speed += other.low_speed;
         self.low_normal_force += other.low_normal_force;
         self.slip_out_of_range += other.slip_out_of_range;
+        self.delay_line_filling += other.delay_line_filling;
         self.refused += other.refused;
     }
 }
@@ -93,14 +97,27 @@ pub enum FrictionNoise {
         /// 1-sigma of friction.
         friction_std: f64,
     },
+    /// From the model that a diagnosis wrote: the noise of one drag reading.
+    Modelled {
+        /// 1-sigma of the drag channel in N, ...
+        drag_std_n: f64,
+        /// ... and the part of it that grows with the drag, as a share of the drag.
+        share_of_drag: f64,
+    },
 }
 
 impl FrictionNoise {
-    /// 1-sigma of friction at a normal force in N.
-    pub fn friction_std(&self, normal_force_n: f64) -> f64 {
+    /// 1-sigma of friction at a normal force in N, where about `friction` is expected.
+    pub fn friction_std(&self, normal_force_n: f64, friction: f64) -> f64 {
         match *self {
             Self::Declared { drag_std_n } => drag_std_n / normal_force_n,
             Self::Estimated { friction_std } => friction_std,
+            Self::Modelled {
+                drag_std_n,
+                share_of_drag,
+            } => (drag_std_n / normal_force_n)
+                .hypot(share_of_drag * friction)
+                .max(SMALLEST_FRICTION_STD),
         }
     }
 }
@@ -114,6 +131,12 @@ pub struct Survey {
     pub median_normal_force_n: f64,
     /// The noise of a friction measurement.
     pub noise: FrictionNoise,
+    /// Rows of the recording.
+    pub rows: u64,
+    /// The first finite time in s; `NaN` where there is none.
+    pub first_time_s: f64,
+    /// Mean time between rows in s; `NaN` of fewer than two.
+    pub mean_step_s: f64,
 }
 
 impl Survey {
@@ -130,7 +153,16 @@ impl Survey {
         let declared = rig.noise.get(Channel::DragForce.name()).copied();
         let mut normal_forces = Vec::new();
         let mut samples = Thinned::new(NOISE_POINTS);
+        let mut rows = 0_u64;
+        let (mut first_time_s, mut last_time_s) = (f64::NAN, f64::NAN);
         for_each_row(recording, progress, |row| {
+            rows += 1;
+            if row.time_s().is_finite() {
+                last_time_s = row.time_s();
+                if first_time_s.is_nan() {
+                    first_time_s = last_time_s;
+                }
+            }
             let sample = row.rig_sample();
             if sample.normal_force_n.is_finite() {
                 normal_forces.push(sample.normal_force_n);
@@ -151,6 +183,9 @@ impl Survey {
             limits,
             median_normal_force_n,
             noise,
+            rows,
+            first_time_s,
+            mean_step_s: (last_time_s - first_time_s) / (rows as f64 - 1.0),
         })
     }
 }
@@ -204,7 +239,11 @@ pub fn for_each_measurement<E: From<InputError>>(
     outcome.map(|()| skipped)
 }
 
-fn for_each_row(
+/// Goes through all rows of a recording. `progress` is told the bytes gone through.
+///
+/// # Errors
+/// [`InputError`] if the recording is malformed anywhere.
+pub(crate) fn for_each_row(
     recording: &mut Recording,
     progress: &mut dyn FnMut(u64),
     mut take: impl FnMut(&Row<'_>),

@@ -2,7 +2,7 @@
 
 use muslip::filter::PeakEstimate;
 
-use crate::estimate::{Consistency, EstimateResult, EstimatorKind, Verdict};
+use crate::estimate::{Consistency, EstimateResult, EstimatorKind, ModelUse, Operation, Verdict};
 use crate::measure::{FrictionNoise, Survey};
 
 /// Probability below which innovations are not believed to be white.
@@ -76,6 +76,48 @@ pub fn consistency_sentence(consistency: &Consistency, estimator: EstimatorKind)
     )
 }
 
+/// What of a model was compensated, what was not and why, and what operation the estimate holds at.
+pub fn model_sentences(model: &ModelUse) -> Vec<String> {
+    let names: Vec<String> = model
+        .compensated()
+        .map(|mechanism| {
+            let parameters: Vec<String> = mechanism
+                .parameters
+                .iter()
+                .map(|(name, value, unit)| {
+                    let unit = if unit == "1" { "" } else { unit };
+                    format!("{name} {value:.4} {unit}").trim_end().to_owned()
+                })
+                .collect();
+            format!("{} ({})", mechanism.id, parameters.join(", "))
+        })
+        .collect();
+    let mut sentences = vec![if names.is_empty() {
+        "Compensated: nothing of the model.".to_owned()
+    } else {
+        format!("Compensated: {}.", names.join("; "))
+    }];
+    let rest: Vec<String> = model
+        .not_compensated()
+        .map(|(mechanism, reason)| format!("{}: {reason}", mechanism.name()))
+        .collect();
+    if !rest.is_empty() {
+        sentences.push(format!("Not compensated: {}.", rest.join("; ")));
+    }
+    if !model.holds_at.is_empty() {
+        sentences.push(format!(
+            "The peak friction is that at {}.",
+            model
+                .holds_at
+                .iter()
+                .map(Operation::in_words)
+                .collect::<Vec<_>>()
+                .join(" and ")
+        ));
+    }
+    sentences
+}
+
 /// Where the noise of a measurement came from.
 pub fn noise_sentence(survey: &Survey) -> String {
     let median = survey.median_normal_force_n;
@@ -86,6 +128,10 @@ pub fn noise_sentence(survey: &Survey) -> String {
         ),
         FrictionNoise::Estimated { friction_std } => format!(
             "Friction noise {friction_std:.4} (1-sigma), estimated from the scatter of the recording: the rig file declares none for drag_force_n."
+        ),
+        FrictionNoise::Modelled { drag_std_n, .. } => format!(
+            "Friction noise {:.4} (1-sigma): {drag_std_n:.4} N of drag, from the model, over a median normal force of {median:.0} N.",
+            drag_std_n / median
         ),
     }
 }

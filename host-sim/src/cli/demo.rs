@@ -32,6 +32,7 @@ pub(super) fn run(arguments: &Arguments, terminal: &mut Terminal) -> Result<(), 
     let job = Job {
         rig_path: &rig,
         recording_path: &recording,
+        model_path: None,
         options: EstimateOptions {
             estimator: EstimatorKind::Article,
             range: Range::Automotive,

@@ -9,6 +9,7 @@ use muslip::filter::mu_slip::Range;
 use super::Failure;
 use super::progress::Progress;
 use super::terminal::Terminal;
+use crate::diagnose::model_file::ModelFile;
 use crate::estimate::{
     EstimateError, EstimateOptions, EstimateResult, EstimatorKind, TraceFormat, TraceWriter,
     estimate,
@@ -17,7 +18,7 @@ use crate::output::{OutputError, OutputFile, write_file};
 use crate::recording::Recording;
 use crate::report::{CurveLabel, of_estimate};
 use crate::rig_file::RigFile;
-use crate::wording::{consistency_sentence, estimate_sentence, noise_sentence};
+use crate::wording::{consistency_sentence, estimate_sentence, model_sentences, noise_sentence};
 
 /// The name that stands for standard output.
 const PRINTED: &str = "-";
@@ -31,7 +32,8 @@ const PRINTED: &str = "-";
 #[command(after_help = "Examples:\n  \
 muslip estimate --rig rig.toml run.csv\n  \
 muslip estimate --rig rig.toml --range automotive --report run.html run.csv\n  \
-muslip estimate --rig rig.toml --trace trace.csv --json run.csv")]
+muslip estimate --rig rig.toml --trace trace.csv --json run.csv\n  \
+muslip estimate --rig rig.toml --model found/model.toml run.csv")]
 pub(super) struct Arguments {
     /// Rig file (TOML).
     #[arg(long, value_name = "RIG.toml")]
@@ -43,8 +45,10 @@ pub(super) struct Arguments {
     /// Which filter estimates.
     #[arg(long, value_enum, default_value_t = EstimatorChoice::Article)]
     estimator: EstimatorChoice,
-    /// Compensate the effects of a model that a diagnosis wrote.
-    #[arg(long, value_name = "MODEL.toml", hide = true)]
+    /// Compensate what a diagnosis found, sample by sample: `model.toml` as `diagnose` writes it. Effects
+    /// that can be compensated are radius, delay, lag, zero drift, crosstalk, load and speed
+    /// sensitivity, relaxation and tread temperature; others are named and left.
+    #[arg(long, value_name = "MODEL.toml")]
     model: Option<PathBuf>,
     /// Write the estimate after every sample: CSV, or JSON where the name ends in .json or .jsonl; `-`
     /// prints it as CSV in place of the words.
@@ -96,12 +100,6 @@ pub(super) fn run(arguments: &Arguments, terminal: &mut Terminal) -> Result<(), 
             ));
         }
     };
-    if arguments.model.is_some() {
-        return Err(Failure::Usage(
-            "--model is not part of this version: the estimate takes the rig file's tyre, radius and noise alone"
-                .into(),
-        ));
-    }
     let trace_is_printed = arguments.trace.as_deref() == Some(Path::new(PRINTED));
     if trace_is_printed && arguments.json {
         return Err(Failure::Usage(
@@ -115,6 +113,7 @@ pub(super) fn run(arguments: &Arguments, terminal: &mut Terminal) -> Result<(), 
             estimator,
             range: arguments.range.into(),
         },
+        model_path: arguments.model.as_deref(),
         trace: arguments.trace.as_deref(),
         report: arguments.report.as_deref(),
         beside: None,
@@ -144,6 +143,7 @@ pub(super) struct Job<'a> {
     pub(super) rig_path: &'a Path,
     pub(super) recording_path: &'a Path,
     pub(super) options: EstimateOptions,
+    pub(super) model_path: Option<&'a Path>,
     pub(super) trace: Option<&'a Path>,
     pub(super) report: Option<&'a Path>,
     pub(super) beside: Option<CurveLabel>,
@@ -152,6 +152,14 @@ pub(super) struct Job<'a> {
 impl Job<'_> {
     pub(super) fn run(&self) -> Result<EstimateResult, Failure> {
         let rig = RigFile::read(self.rig_path)?;
+        let model = match self.model_path {
+            Some(path) => {
+                let model = ModelFile::read(path)?;
+                model.check_rig(self.rig_path, &rig)?;
+                Some(model.repaired)
+            }
+            None => None,
+        };
         let mut recording = Recording::open(self.recording_path)?;
         let mut progress = Progress::new("estimate", 2 * recording.length_bytes());
         let mut report_bytes = |bytes| progress.done(bytes);
@@ -169,6 +177,7 @@ impl Job<'_> {
             &mut recording,
             &rig,
             self.options,
+            model.as_ref(),
             trace.as_mut(),
             &mut report_bytes,
         )
@@ -190,16 +199,23 @@ impl Job<'_> {
     }
 
     fn failure(&self, error: EstimateError) -> Failure {
-        match (error, self.trace) {
-            (EstimateError::Trace(error), Some(path)) => trace_failure(path, error),
-            (error, _) => error.into(),
+        match (error, self.trace, self.model_path) {
+            (EstimateError::Trace(error), Some(path), _) => trace_failure(path, error),
+            (EstimateError::Model(what), _, Some(path)) => {
+                Failure::Usage(format!("{}: {what}", path.display()))
+            }
+            (error, _, _) => error.into(),
         }
     }
 
     /// The command that makes the report again.
     fn command(&self) -> String {
+        let model = match self.model_path {
+            Some(path) => format!("--model {} ", path.display()),
+            None => String::new(),
+        };
         format!(
-            "muslip estimate --rig {} --range {} --estimator {} {}",
+            "muslip estimate --rig {} --range {} --estimator {} {model}{}",
             self.rig_path.display(),
             crate::estimate::range_word(self.options.range),
             self.options.estimator.word(),
@@ -280,6 +296,9 @@ pub(super) fn tell(result: &EstimateResult, terminal: &mut Terminal) -> Result<(
         ("samples", format!("{} used, {skipped}", result.used)),
     ])?;
     terminal.line("")?;
+    for sentence in result.model.iter().flat_map(model_sentences) {
+        terminal.paragraph(&sentence)?;
+    }
     terminal.paragraph(&consistency_sentence(
         &result.consistency,
         result.options.estimator,

@@ -2,21 +2,29 @@
 //! out, with their uncertainty and a verdict on whether to believe it.
 
 mod consistency;
+mod model;
 mod trace;
 
 use std::io::{self, Write};
 
-use muslip::filter::mu_slip::{Config, ConfigError, Estimate, Fusion, Range, UpdateError};
+use muslip::compensate::{Compensated, NoMeasurement};
+use muslip::filter::mu_slip::{
+    Config, ConfigError, Estimate, Fusion, MuSlipFilter, Range, UpdateError,
+};
 use muslip::filter::{Estimator, FrictionMeasurement, PeakEstimate};
+use muslip::law::rudd::Expansion;
+use muslip::sample::slip_friction;
+use muslip_diagnose::repaired::Repaired;
 use serde::Serialize;
 use serde_json::json;
 
 pub use consistency::{Consistency, ConsistencyTest, Verdict, mean_nis_band};
+pub use model::{ModelUse, ModelledMechanism, Operation};
 pub use trace::{TraceFormat, TraceRow, TraceWriter};
 
 use crate::input_error::{InputError, InputProblem};
-use crate::measure::{FrictionNoise, Skipped, Survey, for_each_measurement};
-use crate::recording::Recording;
+use crate::measure::{FrictionNoise, Skipped, Survey, for_each_row};
+use crate::recording::{Recording, Row};
 use crate::rig_file::RigFile;
 use crate::thin::Thinned;
 
@@ -75,6 +83,8 @@ pub struct EstimateResult {
     pub used: u64,
     /// Samples that were not.
     pub skipped: Skipped,
+    /// What of a model was compensated, where one was given.
+    pub model: Option<ModelUse>,
     /// Where the measurement noise came from, and the smallest normal force.
     pub survey: Survey,
     /// Whether the filter was consistent.
@@ -97,6 +107,9 @@ pub enum EstimateError {
     /// The filter refuses its own earlier state, which no sound filter does.
     #[error(transparent)]
     Filter(#[from] UpdateError),
+    /// The model's figures are none that can be compensated.
+    #[error("the model cannot be compensated: {0}")]
+    Model(String),
     /// The trace could not be written.
     #[error(transparent)]
     Trace(#[from] io::Error),
@@ -104,56 +117,151 @@ pub enum EstimateError {
 
 /// Estimates the curve of one recording, in two streaming passes.
 ///
-/// `trace` takes the estimate after every used sample. `progress` is told the bytes gone through, of
-/// twice the recording's length.
+/// `model` is what a diagnosis found: of its mechanisms those are compensated that can be, sample by
+/// sample, and where the rig file declares no drag noise the model's counts. `trace` takes the estimate
+/// after every used sample. `progress` is told the bytes gone through, of twice the recording's length.
 ///
 /// # Errors
 /// [`EstimateError::Input`] for a malformed recording or one without a usable sample,
-/// [`EstimateError::Trace`] with what the trace's sink answers.
+/// [`EstimateError::Model`] for a model that cannot be compensated, [`EstimateError::Trace`] with what the
+/// trace's sink answers.
 pub fn estimate<W: Write>(
     recording: &mut Recording,
     rig: &RigFile,
     options: EstimateOptions,
+    model: Option<&Repaired>,
     trace: Option<&mut TraceWriter<W>>,
     progress: &mut dyn FnMut(u64),
 ) -> Result<EstimateResult, EstimateError> {
-    let survey = Survey::of(recording, rig, progress)?;
+    let mut survey = Survey::of(recording, rig, progress)?;
     let length = recording.length_bytes();
     let mut progress = |bytes| progress(length + bytes);
+    let radius_m = rig.wheel.radius_m;
+    let model =
+        model.map(|model| ModelUse::of(model, &recording.path().to_string_lossy(), &survey));
+    let mut front = Front {
+        radius_m,
+        compensator: None,
+        last_time_s: f64::NAN,
+        skipped: Skipped::default(),
+    };
+    if let Some(used) = &model {
+        let (drag_std_n, share_of_drag) = used.noise;
+        if matches!(survey.noise, FrictionNoise::Estimated { .. }) && drag_std_n > 0.0 {
+            survey.noise = FrictionNoise::Modelled {
+                drag_std_n,
+                share_of_drag,
+            };
+        }
+        let compensator = model::compensator(used, radius_m, &survey);
+        front.compensator = Some(compensator.map_err(EstimateError::Model)?);
+    }
     match options.estimator {
         EstimatorKind::Article => {
             let filter = Config::for_range(options.range).build()?;
-            run(
+            let mut result = run(
                 filter,
+                front,
                 recording,
-                rig,
                 options,
                 survey,
                 trace,
                 &mut progress,
-            )
+            )?;
+            result.model = model;
+            Ok(result)
         }
     }
 }
 
-fn run<F, W: Write>(
-    mut filter: F,
+/// One row as the filter takes it.
+struct Measured {
+    time_s: f64,
+    measurement: FrictionMeasurement<f64>,
+    /// What the reading is expected to be; `None` where it reads the law at its slip.
+    expected: Option<Expansion<f64>>,
+}
+
+/// What stands between rows and filter: slip and friction, and the compensation of a model.
+struct Front {
+    radius_m: f64,
+    compensator: Option<Box<dyn model::Compensating>>,
+    /// Time of the last row that the compensator took, in s.
+    last_time_s: f64,
+    skipped: Skipped,
+}
+
+impl Front {
+    /// The row as a measurement at the filter's present state; `None`, counted, if it is none.
+    fn measured(
+        &mut self,
+        row: &Row<'_>,
+        survey: &Survey,
+        state: &muslip::filter::mu_slip::State<f64>,
+    ) -> Option<Measured> {
+        let time_s = row.time_s();
+        if !time_s.is_finite() {
+            self.skipped.not_finite += 1;
+            return None;
+        }
+        let sample = row.rig_sample();
+        let Some(compensator) = &mut self.compensator else {
+            return match slip_friction(&sample, self.radius_m, &survey.limits) {
+                Ok(point) => Some(Measured {
+                    time_s,
+                    measurement: FrictionMeasurement {
+                        slip_ratio: point.slip_ratio,
+                        friction: point.friction,
+                        friction_std: survey
+                            .noise
+                            .friction_std(sample.normal_force_n, point.friction),
+                    },
+                    expected: None,
+                }),
+                Err(error) => {
+                    self.skipped.count(error);
+                    None
+                }
+            };
+        };
+        // The first step's time is not used.
+        let dt_s = (time_s - self.last_time_s).max(0.0);
+        match compensator.step(&sample, dt_s, state) {
+            Ok(outcome) => {
+                self.last_time_s = time_s;
+                match outcome {
+                    Compensated::Measurement(compensated) => {
+                        let noise = survey.noise.friction_std(
+                            compensated.normal_force_n,
+                            compensated.expected.friction,
+                        );
+                        return Some(Measured {
+                            time_s,
+                            measurement: compensated.measurement(noise),
+                            expected: Some(compensated.expected),
+                        });
+                    }
+                    Compensated::Nothing(NoMeasurement::Sample(error)) => self.skipped.count(error),
+                    Compensated::Nothing(_) => self.skipped.delay_line_filling += 1,
+                }
+            }
+            // The compensator is what it was: the row's time belongs to the next one.
+            Err(muslip::compensate::StepError::NonFinite { .. }) => self.skipped.not_finite += 1,
+            Err(_) => self.skipped.refused += 1,
+        }
+        None
+    }
+}
+
+fn run<W: Write>(
+    mut filter: MuSlipFilter<f64>,
+    mut front: Front,
     recording: &mut Recording,
-    rig: &RigFile,
     options: EstimateOptions,
     survey: Survey,
     mut trace: Option<&mut TraceWriter<W>>,
     progress: &mut dyn FnMut(u64),
-) -> Result<EstimateResult, EstimateError>
-where
-    F: Estimator<
-            f64,
-            Measurement = FrictionMeasurement<f64>,
-            Fusion = Fusion<f64>,
-            Estimate = Estimate<f64>,
-            Error = UpdateError,
-        >,
-{
+) -> Result<EstimateResult, EstimateError> {
     let mut test = ConsistencyTest::default();
     let mut points = Thinned::new(PLOTTED_POINTS);
     let mut steps = Vec::new();
@@ -161,51 +269,60 @@ where
     let mut last_step = None;
     let mut used = 0;
     let mut refused = 0;
-    let mut skipped = for_each_measurement(
-        recording,
-        rig.wheel.radius_m,
-        &survey.limits,
-        progress,
-        |measured| -> Result<(), EstimateError> {
-            let before = filter.estimate();
-            let outcome = filter.update(&FrictionMeasurement {
-                slip_ratio: measured.point.slip_ratio,
-                friction: measured.point.friction,
-                friction_std: survey.noise.friction_std(measured.normal_force_n),
-            });
-            // A refused update leaves the filter as it was; the sample is counted and passed over. So is
-            // one whose squared innovation overflows (a reading of 1e308, say): no figure made with it
-            // would be one.
-            let fusion = match outcome {
-                Ok(fusion) if fusion.nis.is_finite() => fusion,
-                _ => {
-                    refused += 1;
-                    return Ok(filter.restore(before)?);
-                }
-            };
-            used += 1;
-            test.add(fusion.innovation / fusion.innovation_variance.sqrt());
-            points.offer(|| (measured.point.slip_ratio, measured.point.friction));
-            let step = || Step {
-                sample: used,
-                peak: filter.peak(),
-                nis: fusion.nis,
-            };
-            if used <= FIRST_STEPS {
-                steps.push(step());
-            } else {
-                later_steps.offer(step);
+    let mut outcome = Ok(());
+    let mut take = |row: &Row<'_>| -> Result<(), EstimateError> {
+        let Some(measured) = front.measured(row, &survey, &filter.state()) else {
+            return Ok(());
+        };
+        let before = filter.estimate();
+        let outcome = match measured.expected {
+            Some(expected) => filter.update_expecting(&measured.measurement, expected),
+            None => filter.update(&measured.measurement),
+        };
+        // A refused update leaves the filter as it was; the sample is counted and passed over. So is
+        // one whose squared innovation overflows (a reading of 1e308, say): no figure made with it
+        // would be one.
+        let fusion = match outcome {
+            Ok(fusion) if fusion.nis.is_finite() => fusion,
+            _ => {
+                refused += 1;
+                return Ok(filter.restore(before)?);
             }
-            last_step = Some(step());
-            match &mut trace {
-                Some(trace) => {
-                    Ok(trace.row(&trace_row(measured.time_s, &fusion, &filter.estimate()))?)
-                }
-                None => Ok(()),
+        };
+        used += 1;
+        test.add(fusion.innovation / fusion.innovation_variance.sqrt());
+        points.offer(|| {
+            (
+                measured.measurement.slip_ratio,
+                measured.measurement.friction,
+            )
+        });
+        let step = || Step {
+            sample: used,
+            peak: filter.peak(),
+            nis: fusion.nis,
+        };
+        if used <= FIRST_STEPS {
+            steps.push(step());
+        } else {
+            later_steps.offer(step);
+        }
+        last_step = Some(step());
+        match &mut trace {
+            Some(trace) => {
+                Ok(trace.row(&trace_row(measured.time_s, &fusion, &filter.estimate()))?)
             }
-        },
-    )?;
-    skipped.refused = refused;
+            None => Ok(()),
+        }
+    };
+    for_each_row(recording, progress, |row| {
+        if outcome.is_ok() {
+            outcome = take(row);
+        }
+    })?;
+    outcome?;
+    let mut skipped = front.skipped;
+    skipped.refused += refused;
     let Some(consistency) = test.outcome() else {
         let problem = InputProblem::NoUsableSample(skipped.in_words());
         return Err(InputError::whole_file(recording.path(), problem).into());
@@ -221,6 +338,7 @@ where
         peak: filter.peak(),
         used,
         skipped,
+        model: None,
         survey,
         consistency,
         points: points.into_items(),
@@ -262,9 +380,15 @@ impl EstimateResult {
             FrictionNoise::Estimated { friction_std } => {
                 json!({"source": "estimated", "friction": friction_std})
             }
+            FrictionNoise::Modelled {
+                drag_std_n,
+                share_of_drag,
+            } => {
+                json!({"source": "model", "drag_force_n": drag_std_n, "share_of_drag": share_of_drag})
+            }
         };
         let c = self.consistency;
-        json!({
+        let mut object = json!({
             "schema": "muslip.estimate/1",
             "estimator": self.options.estimator.word(),
             "range": range_word(self.options.range),
@@ -278,6 +402,7 @@ impl EstimateResult {
                 "skipped_low_speed": self.skipped.low_speed,
                 "skipped_low_normal_force": self.skipped.low_normal_force,
                 "skipped_slip_out_of_range": self.skipped.slip_out_of_range,
+                "skipped_delay_line_filling": self.skipped.delay_line_filling,
                 "skipped_refused": self.skipped.refused,
             },
             "noise": noise,
@@ -288,7 +413,11 @@ impl EstimateResult {
                 "whiteness_p": c.whiteness_p,
                 "verdict": c.verdict.word(),
             },
-        })
+        });
+        if let (Some(model), Some(object)) = (&self.model, object.as_object_mut()) {
+            object.insert("model".to_owned(), model.to_json());
+        }
+        object
     }
 }
 

@@ -7,7 +7,9 @@ use super::figure::{Figure, Ink, Shape, ellipse};
 use super::page::{Block, KeyFigure, Report, Section, Tone};
 use crate::estimate::{EstimateResult, Verdict, range_word};
 use crate::fit::Curve;
-use crate::wording::{consistency_sentence, estimate_sentence, noise_sentence, plus_minus};
+use crate::wording::{
+    consistency_sentence, estimate_sentence, model_sentences, noise_sentence, plus_minus,
+};
 
 /// A curve to draw beside the estimate, under its name in the legend.
 #[derive(Debug, Clone, PartialEq)]
@@ -43,6 +45,14 @@ pub fn of_estimate(
         .collect();
     let mut samples = vec![vec!["used".to_owned(), result.used.to_string()]];
     samples.extend(skipped);
+    let mut curve: Vec<Block> = result
+        .model
+        .iter()
+        .flat_map(model_sentences)
+        .map(Block::Paragraph)
+        .collect();
+    curve.push(Block::Figure(curve_figure(result, beside)));
+    curve.push(Block::Figure(peak_figure(result)));
     Report {
         title: "Peak friction estimate".into(),
         subject: format!(
@@ -73,10 +83,7 @@ pub fn of_estimate(
         sections: vec![
             Section {
                 heading: "The curve".into(),
-                blocks: vec![
-                    Block::Figure(curve_figure(result, beside)),
-                    Block::Figure(peak_figure(result)),
-                ],
+                blocks: curve,
             },
             Section {
                 heading: "How the estimate settled".into(),

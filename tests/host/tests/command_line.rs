@@ -131,17 +131,6 @@ fn bad_usage_is_one_line_and_status_2() {
             ],
             "error: --estimator efficient is not part of this version",
         ),
-        (
-            &[
-                "estimate",
-                "--rig",
-                "rig.toml",
-                "--model",
-                "model.toml",
-                "run.csv",
-            ],
-            "error: --model is not part of this version",
-        ),
     ] {
         let complaint = scratch.complaint(arguments);
         assert!(complaint.contains(part), "{complaint}");

@@ -140,21 +140,41 @@ const IDLE_COLUMNS: [&str; 5] = [
 
 /// Makes a campaign to order; draws rig and plan afresh until the order can be met.
 pub fn make(name: &str, seed: u64, order: &Order) -> Result<Campaign> {
+    attempts(seed, order, |attempt| {
+        attempt_once(name, seed, attempt, order, false).map(|(campaign, _)| campaign)
+    })
+}
+
+/// As [`make`], with the fresh runs recorded once more on a rig without the effects: the same programme,
+/// the same noise.
+pub fn make_with_twin(name: &str, seed: u64, order: &Order) -> Result<(Campaign, Vec<Recorded>)> {
+    attempts(seed, order, |attempt| {
+        attempt_once(name, seed, attempt, order, true)
+    })
+}
+
+fn attempts<T>(seed: u64, order: &Order, once: impl Fn(u64) -> Result<T>) -> Result<T> {
     let mut why = String::from("no attempt");
     for attempt in 0..80 {
-        match attempt_once(name, seed, attempt, order) {
-            Ok(campaign) => return Ok(campaign),
+        match once(attempt) {
+            Ok(made) => return Ok(made),
             Err(error) => why = format!("{error}"),
         }
     }
     bail!(
-        "no rig and plan can conceal {:?} at {:?}: {why}",
+        "no rig and plan can conceal {:?} at {:?} (seed {seed}): {why}",
         order.forms,
         order.strength
     )
 }
 
-fn attempt_once(name: &str, seed: u64, attempt: u64, order: &Order) -> Result<Campaign> {
+fn attempt_once(
+    name: &str,
+    seed: u64,
+    attempt: u64,
+    order: &Order,
+    with_twin: bool,
+) -> Result<(Campaign, Vec<Recorded>)> {
     let mut draw = Draw::new(seed, &[attempt]);
     let needs = order
         .forms
@@ -313,6 +333,7 @@ fn attempt_once(name: &str, seed: u64, attempt: u64, order: &Order) -> Result<Ca
             )
         })
         .collect();
+    let truth_rig = rig.clone();
     let truth = Truth {
         campaign: name.to_owned(),
         seed,
@@ -333,9 +354,25 @@ fn attempt_once(name: &str, seed: u64, attempt: u64, order: &Order) -> Result<Ca
         fresh: fresh_truth,
         gain_scored,
         column,
-        rig,
+        rig: truth_rig,
     };
-    Ok(Campaign { truth, fit, fresh })
+    let twin = if with_twin {
+        let (rides, _) = bench.ride(&[], 0..all_runs.len())?;
+        let mut draw = Draw::new(seed, &[attempt, 77]);
+        rides
+            .iter()
+            .enumerate()
+            .map(|(index, ride)| Recorded {
+                file: format!("twin{:02}.csv", (index + 1).saturating_sub(fit_count)),
+                clean: ride.clean.clone(),
+                written: ride.write(&truth.rig, &errors[index], &mut draw),
+            })
+            .skip(fit_count)
+            .collect()
+    } else {
+        Vec::new()
+    };
+    Ok((Campaign { truth, fit, fresh }, twin))
 }
 
 /// Gives a null campaign the character that its kind asks for.

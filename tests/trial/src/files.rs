@@ -143,7 +143,8 @@ fn reading(recorded: &Recorded, truth: &Truth) -> String {
 
 /// A recording as its logger writes it: some with remarks on top, some with the columns in an
 /// order of their own.
-fn recording(truth: &Truth, recorded: &Recorded, with_drag: bool) -> String {
+/// A recorded run as the file that a user would have.
+pub fn recording(truth: &Truth, recorded: &Recorded, with_drag: bool) -> String {
     let (rig, column) = (&truth.rig, truth.column.as_deref());
     let mut habit = Draw::new(truth.seed, &[0x1066e5]);
     let (remarks, own_order) = (habit.chance(0.15), habit.chance(0.2));

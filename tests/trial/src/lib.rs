@@ -14,6 +14,7 @@ mod checks;
 mod contract;
 mod draw;
 mod effect;
+mod estimate;
 mod figures;
 mod files;
 mod form;
@@ -36,6 +37,7 @@ mod tool;
 mod trial;
 mod tyre;
 
+pub use estimate::{Compensation, compensation};
 pub use files::generate;
 pub use score::{Report, ScoreRequest, score};
 pub use strata::Request;

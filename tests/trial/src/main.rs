@@ -4,7 +4,9 @@ use std::path::PathBuf;
 
 use anyhow::Result;
 use clap::{Args, Parser, Subcommand};
-use sealed_trial::{Request, ScoreRequest, Tool, Trial, generate, score, trial};
+use sealed_trial::{
+    Compensation, Request, ScoreRequest, Tool, Trial, compensation, generate, score, trial,
+};
 
 /// Conceal effects in recordings, have them diagnosed, and judge.
 #[derive(Parser)]
@@ -89,6 +91,31 @@ enum Command {
         /// Write everything to this file.
         #[arg(long)]
         out: Option<PathBuf>,
+    },
+    /// Estimate fresh runs with and without the model that a diagnosis wrote, beside the same runs of a rig
+    /// without the effect.
+    Compensate {
+        /// The tool under trial.
+        #[arg(long, default_value = "target/release/muslip")]
+        muslip: PathBuf,
+        /// Seed of every draw.
+        #[arg(long, default_value_t = 20_260)]
+        seed: u64,
+        /// Campaigns of each mechanism.
+        #[arg(long, default_value_t = 24)]
+        count: usize,
+        /// Which estimator.
+        #[arg(long, default_value = "article")]
+        estimator: String,
+        /// Scratch directory.
+        #[arg(long, default_value = "target/compensation")]
+        work: PathBuf,
+        /// Page to write.
+        #[arg(long)]
+        page: Option<PathBuf>,
+        /// One line a run as well.
+        #[arg(long)]
+        all: bool,
     },
     /// Generate from a fresh seed, score, and write the pages.
     Run(RunArguments),
@@ -175,6 +202,30 @@ fn main() -> Result<()> {
             }
             if let Some(path) = out {
                 report.write(&path)?;
+            }
+        }
+        Command::Compensate {
+            muslip,
+            seed,
+            count,
+            estimator,
+            work,
+            page,
+            all,
+        } => {
+            let report = compensation(&Compensation {
+                muslip,
+                seed,
+                count,
+                estimator,
+                work,
+            })?;
+            if all {
+                print!("{}", report.lines());
+            }
+            print!("{}", report.text());
+            if let Some(page) = page {
+                std::fs::write(page, report.markdown())?;
             }
         }
         Command::Run(run) => {

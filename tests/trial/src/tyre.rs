@@ -232,7 +232,7 @@ pub fn radius_change(effect: &Effect, contact: &Contact, scale: &Scale) -> f64 {
 }
 
 /// Factors on peak friction and critical slip.
-fn curve_scaling(effect: &Effect, contact: &Contact, scale: &Scale) -> (f64, f64) {
+pub fn curve_scaling(effect: &Effect, contact: &Contact, scale: &Scale) -> (f64, f64) {
     let load = (contact.load / scale.load).max(1e-3);
     match effect.form {
         Form::LoadPower => (load.powf(-effect.a), 1.0),
