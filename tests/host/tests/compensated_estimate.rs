@@ -41,6 +41,9 @@ critical_slip = 0.14
 drag_force_n = 60.0
 ";
 
+/// From drag, load, time and time step to what the load cell reads.
+type Reading = Box<dyn FnMut(f64, f64, f64, f64) -> f64>;
+
 /// What is done to the run, and the mechanism that says so.
 struct Case {
     id: &'static str,
@@ -48,10 +51,10 @@ struct Case {
     parameters: &'static [(&'static str, f64)],
     true_radius: f64,
     plant: fn() -> Option<Box<dyn PlantEffect>>,
-    reading: fn() -> Box<dyn FnMut(f64, f64, f64, f64) -> f64>,
+    reading: fn() -> Reading,
 }
 
-fn untouched() -> Box<dyn FnMut(f64, f64, f64, f64) -> f64> {
+fn untouched() -> Reading {
     Box::new(|drag, _load, _time, _dt| drag)
 }
 
