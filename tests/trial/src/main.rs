@@ -146,6 +146,9 @@ struct RunArguments {
     /// Diagnose every so manieth campaign without each part of the argument as well; 0: none.
     #[arg(long, default_value_t = 4)]
     ablate_every: usize,
+    /// Leave out the diagnosis of ten million samples.
+    #[arg(long)]
+    no_ten_million: bool,
     /// Write every judged campaign to this file as JSON.
     #[arg(long)]
     json: Option<PathBuf>,
@@ -242,6 +245,7 @@ fn main() -> Result<()> {
                 data: run.data,
                 jobs: run.tool.jobs,
                 ablate_every: run.ablate_every,
+                ten_million: !run.no_ten_million,
             })?;
             print!("{}", report.text());
             if let Some(path) = run.json {

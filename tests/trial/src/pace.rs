@@ -103,8 +103,8 @@ fn measure(
     })
 }
 
-/// Measures both sizes, or the small one only.
-pub fn paces(tool: &Tool, work: &Path, small: bool) -> Result<Vec<Pace>> {
+/// Measures six runs, and ten million samples where asked for.
+pub fn paces(tool: &Tool, work: &Path, ten_million: bool) -> Result<Vec<Pace>> {
     let mut found = vec![measure(
         tool,
         &work.join("six"),
@@ -112,7 +112,7 @@ pub fn paces(tool: &Tool, work: &Path, small: bool) -> Result<Vec<Pace>> {
         (6, 5000),
         (2.0, None),
     )?];
-    if !small {
+    if ten_million {
         found.push(measure(
             tool,
             &work.join("ten-million"),

@@ -38,6 +38,8 @@ pub struct Trial {
     pub jobs: usize,
     /// Every so manieth campaign is diagnosed again with each part of the argument left out; none where zero.
     pub ablate_every: usize,
+    /// Ten million samples are diagnosed too, which takes gigabytes of disk and of memory.
+    pub ten_million: bool,
 }
 
 /// Parts that `muslip diagnose --ablate` can leave out.
@@ -146,6 +148,12 @@ fn campaigns(trial: &Trial, directory: &Path) -> Result<String> {
 /// Where a file cannot be written, no rig can show an ordered effect, or the tool is missing; of a small
 /// trial also where its loose bars do not hold.
 pub fn trial(trial: &Trial) -> Result<Report> {
+    // The tool as it is now: a build that goes on meanwhile must not change it under way.
+    let (tool, program) = frozen(trial)?;
+    let trial = &Trial {
+        tool,
+        ..trial.clone()
+    };
     let directory = trial.work.join(if trial.small {
         format!("seed-{}-small", trial.seed)
     } else {
@@ -153,9 +161,6 @@ pub fn trial(trial: &Trial) -> Result<Report> {
     });
     let hash = campaigns(trial, &directory)?;
     println!("sealed truth sha256 {hash}");
-    let program = fs::read(&trial.tool.path)
-        .with_context(|| format!("no tool at {}", trial.tool.path.display()))?;
-    let program = digest([program.as_slice()]);
     println!("tool sha256 {program}");
     // Answers of another tool or to other campaigns are other answers.
     let answers = directory.join(format!("answers-{}-{}", &hash[..12], &program[..12]));
@@ -209,15 +214,46 @@ pub fn trial(trial: &Trial) -> Result<Report> {
     Ok(report)
 }
 
+/// A copy of the tool under its own hash, and the hash.
+fn frozen(trial: &Trial) -> Result<(Tool, String)> {
+    let program = fs::read(&trial.tool.path)
+        .with_context(|| format!("no tool at {}", trial.tool.path.display()))?;
+    let hash = digest([program.as_slice()]);
+    let folder = trial.work.join("tools");
+    fs::create_dir_all(&folder).with_context(|| format!("cannot make {}", folder.display()))?;
+    let path = folder.join(format!("muslip-{}", &hash[..12]));
+    if !path.exists() {
+        let part = path.with_extension("part");
+        fs::copy(&trial.tool.path, &part)?;
+        fs::rename(&part, &path)?;
+    }
+    let path = fs::canonicalize(path)?;
+    Ok((
+        Tool {
+            path,
+            ..trial.tool.clone()
+        },
+        hash,
+    ))
+}
+
 /// Speeds, kept beside the answers so that a trial that was stopped does not measure again.
 fn speeds(trial: &Trial, answers: &Path) -> Result<Vec<Pace>> {
-    let kept = answers.join("pace.json");
+    let kept = answers.join(if trial.ten_million {
+        "pace.json"
+    } else {
+        "pace-six.json"
+    });
     if let Ok(text) = fs::read_to_string(&kept)
         && let Ok(found) = serde_json::from_str(&text)
     {
         return Ok(found);
     }
-    let found = pace::paces(&trial.tool, &trial.work.join("pace"), trial.small)?;
+    let found = pace::paces(
+        &trial.tool,
+        &trial.work.join("pace"),
+        trial.ten_million && !trial.small,
+    )?;
     fs::create_dir_all(answers)?;
     fs::write(kept, serde_json::to_string(&found)?)?;
     Ok(found)
