@@ -40,8 +40,11 @@ pub fn symptom(case: &Case) -> String {
                     "said that something is left, but named {wrong} beside it"
                 ));
             }
-            if case.variable_right == Some(false) {
-                said.push(format!("depends on another variable than {}", left(case)));
+            if case.variable_right == Some(false) && !case.unexplained.is_empty() {
+                said.push(format!(
+                    "it depends on another variable than {}",
+                    left(case)
+                ));
             }
         }
         _ => {

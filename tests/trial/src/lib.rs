@@ -42,4 +42,4 @@ pub use files::generate;
 pub use score::{Report, ScoreRequest, score};
 pub use strata::Request;
 pub use tool::Tool;
-pub use trial::{Trial, trial};
+pub use trial::{Trial, only_measured, trial};

@@ -5,7 +5,8 @@ use std::path::PathBuf;
 use anyhow::Result;
 use clap::{Args, Parser, Subcommand};
 use sealed_trial::{
-    Compensation, Request, ScoreRequest, Tool, Trial, compensation, generate, score, trial,
+    Compensation, Request, ScoreRequest, Tool, Trial, compensation, generate, only_measured, score,
+    trial,
 };
 
 /// Conceal effects in recordings, have them diagnosed, and judge.
@@ -119,6 +120,8 @@ enum Command {
     },
     /// Generate from a fresh seed, score, and write the pages.
     Run(RunArguments),
+    /// Only what `run` does with measured recordings.
+    Measured(RunArguments),
 }
 
 #[derive(Args)]
@@ -232,26 +235,31 @@ fn main() -> Result<()> {
             }
         }
         Command::Run(run) => {
-            let pages = run
-                .out
-                .or_else(|| (!run.small).then(|| PathBuf::from("docs")));
-            let report = trial(&Trial {
-                tool: run.tool.tool(),
-                seed: run.seed,
-                small: run.small,
-                scale: run.scale,
-                work: run.work,
-                pages,
-                data: run.data,
-                jobs: run.tool.jobs,
-                ablate_every: run.ablate_every,
-                ten_million: !run.no_ten_million,
-            })?;
+            let report = trial(&run.trial())?;
             print!("{}", report.text());
             if let Some(path) = run.json {
                 report.write(&path)?;
             }
         }
+        Command::Measured(run) => print!("{}", only_measured(&run.trial())?),
     }
     Ok(())
+}
+
+impl RunArguments {
+    fn trial(&self) -> Trial {
+        let docs = || (!self.small).then(|| PathBuf::from("docs"));
+        Trial {
+            tool: self.tool.tool(),
+            seed: self.seed,
+            small: self.small,
+            scale: self.scale,
+            work: self.work.clone(),
+            pages: self.out.clone().or_else(docs),
+            data: self.data.clone(),
+            jobs: self.tool.jobs,
+            ablate_every: self.ablate_every,
+            ten_million: !self.no_ten_million,
+        }
+    }
 }

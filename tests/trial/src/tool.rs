@@ -69,7 +69,10 @@ impl Tool {
         Ok(outcome
             .err()
             .filter(|why| !why.contains("nonexistent"))
-            .map(|why| format!("not taken: {why}")))
+            .map(|why| {
+                let why = why.split(" For more information").next().unwrap_or("");
+                format!("not taken: {why}")
+            }))
     }
 
     /// Diagnoses a campaign and predicts its fresh runs; the sealed truth is not looked at.

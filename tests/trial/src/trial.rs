@@ -74,16 +74,17 @@ fn requests(trial: &Trial) -> Vec<Request> {
         );
         return requests;
     }
+    // Whole rounds of the kinds of null campaign, of the mechanisms and of the effects outside the vocabulary.
     [
-        ("null", 120),
-        ("single", 405),
-        ("pair", 80),
-        ("outside", 85),
+        ("null", 15, 8),
+        ("single", 15, 27),
+        ("pair", 80, 1),
+        ("outside", 5, 17),
     ]
     .into_iter()
-    .map(|(stratum, count)| {
-        let count = (f64::from(count) * trial.scale).ceil().max(1.0) as usize;
-        request(stratum, count, None, None)
+    .map(|(stratum, rounds, kinds)| {
+        let rounds = (f64::from(rounds) * trial.scale).ceil().max(1.0) as usize;
+        request(stratum, rounds * kinds, None, None)
     })
     .collect()
 }
@@ -212,6 +213,21 @@ pub fn trial(trial: &Trial) -> Result<Report> {
         loose(&report, &paces)?;
     }
     Ok(report)
+}
+
+/// Plays the part with measured recordings alone; gives its tables.
+///
+/// # Errors
+/// Where a file cannot be written or the tool is missing.
+pub fn only_measured(trial: &Trial) -> Result<String> {
+    let (tool, program) = frozen(trial)?;
+    let trial = Trial {
+        tool,
+        ..trial.clone()
+    };
+    let directory = trial.work.join(format!("seed-{}-measured", trial.seed));
+    let tables = measured::trial(&trial, &directory, &program[..12])?;
+    Ok(tables.iter().map(Table::text).collect())
 }
 
 /// A copy of the tool under its own hash, and the hash.
