@@ -7,7 +7,7 @@
 use rayon::prelude::*;
 
 use crate::ablation::Ablation;
-use crate::fit::{Fitted, Joint};
+use crate::fit::{Fitted, Joint, Linearised};
 use crate::mechanism::{Balance, Evidence, Id, Stage};
 use crate::model::{Model, Term};
 use crate::omnibus::Levers;
@@ -155,6 +155,7 @@ const KEPT_STARTS: usize = 3;
 /// the loss predicted there; and all starts in that order.
 fn extended(
     joint: &Joint<'_>,
+    known: &Linearised,
     model: &Model,
     entry: usize,
     starts: &[Vec<f64>],
@@ -167,7 +168,7 @@ fn extended(
                 entry,
                 parameters: start.clone(),
             });
-            let (predicted, moved) = joint.outlook(&trial);
+            let (predicted, moved) = joint.outlook(known, &trial);
             predicted
                 .is_finite()
                 .then_some((predicted, trial, moved, start.clone()))
@@ -235,6 +236,10 @@ fn extend(
             }
         }
     }
+    let linear: Vec<Linearised> = beam
+        .par_iter()
+        .map(|c| joint.linearised(&c.fitted.model))
+        .collect();
     let known: &Starts = starts;
     let judged: Vec<Option<Extended>> = jobs
         .par_iter()
@@ -253,7 +258,7 @@ fn extend(
                 own
             };
             let (model, predicted, order) =
-                extended(joint, &beam[place].fitted.model, entry, from)?;
+                extended(joint, &linear[place], &beam[place].fitted.model, entry, from)?;
             Some((model, predicted, order))
         })
         .collect();

@@ -1,5 +1,7 @@
 //! The prepared campaign: all runs, what they have in common, and the catalogue in the numbers needed.
 
+use std::sync::Arc;
+
 use crate::campaign::{Rig, Run};
 use crate::mechanism::{Before, Context, Mechanism, catalogue};
 use crate::number::{Dual, Number};
@@ -7,12 +9,15 @@ use crate::prepare::{DataFault, Series, prepare};
 use crate::smooth::median_in_place;
 
 /// Width of the dual numbers: parameters differentiated in one pass.
-pub const WIDTH: usize = 6;
+pub const WIDTH: usize = 8;
+/// Width of the narrow dual numbers: a mechanism's own parameters when a start is judged.
+pub const NARROW: usize = 2;
 
 /// The catalogue in plain and in dual numbers, in the same order.
 pub struct Catalogue {
     plain: Vec<Box<dyn Mechanism<f64>>>,
     dual: Vec<Box<dyn Mechanism<Dual<WIDTH>>>>,
+    narrow: Vec<Box<dyn Mechanism<Dual<NARROW>>>>,
 }
 
 impl Default for Catalogue {
@@ -20,6 +25,7 @@ impl Default for Catalogue {
         Self {
             plain: catalogue(),
             dual: catalogue(),
+            narrow: catalogue(),
         }
     }
 }
@@ -55,7 +61,14 @@ impl Listed for Dual<WIDTH> {
     }
 }
 
+impl Listed for Dual<NARROW> {
+    fn entry(catalogue: &Catalogue, index: usize) -> &dyn Mechanism<Self> {
+        catalogue.narrow[index].as_ref()
+    }
+}
+
 /// A campaign ready to be analysed.
+#[derive(Clone)]
 pub struct Data {
     /// The rig as declared.
     pub rig: Rig,
@@ -68,7 +81,7 @@ pub struct Data {
     /// What was wrong with the recordings.
     pub faults: Vec<DataFault>,
     /// All mechanisms.
-    pub catalogue: Catalogue,
+    pub catalogue: Arc<Catalogue>,
 }
 
 /// Mean over samples that pass a filter; `fallback` if there are none.
@@ -107,7 +120,7 @@ impl Data {
             context,
             extra_names,
             faults,
-            catalogue: Catalogue::default(),
+            catalogue: Arc::default(),
         }
     }
 

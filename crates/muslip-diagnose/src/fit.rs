@@ -5,7 +5,7 @@ use core::ops::Range;
 
 use nalgebra::{DMatrix, DVector};
 
-use crate::data::{Data, Listed, WIDTH};
+use crate::data::{Data, Listed, NARROW, WIDTH};
 use crate::mechanism::Balance;
 use crate::model::{Model, TYRE_BASE, tyre, vehicle, wheel};
 use crate::noise::{Whitener, loss, weight};
@@ -149,15 +149,28 @@ impl Problem<'_> {
     /// Residual of a run and its derivatives in all parameters, in the residual's unit.
     #[must_use]
     pub fn slopes(&self, model: &Model, run: usize) -> (Vec<f64>, Vec<Vec<f64>>) {
+        self.slopes_from::<WIDTH>(model, run, 0)
+    }
+
+    /// The same with the derivatives in the parameters from `first` on only, `N` in one pass.
+    fn slopes_from<const N: usize>(
+        &self,
+        model: &Model,
+        run: usize,
+        first: usize,
+    ) -> (Vec<f64>, Vec<Vec<f64>>)
+    where
+        Dual<N>: Listed,
+    {
         let p = model.vector();
         let mut values = Vec::new();
-        let mut columns = Vec::with_capacity(p.len());
-        for from in (0..p.len().max(1)).step_by(WIDTH) {
-            let dual: Vec<Dual<WIDTH>> = p
+        let mut columns = Vec::with_capacity(p.len() - first.min(p.len()));
+        for from in (first..p.len().max(first + 1)).step_by(N) {
+            let dual: Vec<Dual<N>> = p
                 .iter()
                 .enumerate()
                 .map(|(i, v)| {
-                    if i >= from && i < from + WIDTH {
+                    if i >= from && i < from + N {
                         Dual::variable(*v, i - from)
                     } else {
                         Dual::constant(*v)
@@ -165,10 +178,10 @@ impl Problem<'_> {
                 })
                 .collect();
             let residual = self.residual(model, &dual, run);
-            if from == 0 {
+            if from == first {
                 values = residual.iter().map(|r| r.value).collect();
             }
-            for i in 0..WIDTH.min(p.len() - from.min(p.len())) {
+            for i in 0..N.min(p.len().saturating_sub(from)) {
                 columns.push(residual.iter().map(|r| r.slope[i]).collect());
             }
         }
@@ -332,12 +345,78 @@ impl Joint<'_> {
         }
     }
 
-    /// Loss that one undamped step from here is predicted to reach, and that step.
+    /// Whitened derivatives of a model in its own parameters, kept for judging what may be added to it.
     #[must_use]
-    pub fn outlook(&self, model: &Model) -> (f64, Vec<f64>) {
-        let (information, gradient, loss) = self.normal(model);
-        let bounds = self.bounds(model);
+    pub fn linearised(&self, model: &Model) -> Linearised {
+        let n = model.vector().len();
+        let mut information = DMatrix::zeros(n, n);
+        let columns = self
+            .parts
+            .iter()
+            .map(|part| {
+                let (own, _, _) = part.normal(model);
+                information += own;
+                part.runs
+                    .iter()
+                    .map(|&run| part.jacobian(model, run).1)
+                    .collect()
+            })
+            .collect();
+        Linearised {
+            columns,
+            information,
+        }
+    }
+
+    /// Loss that one undamped step from here is predicted to reach, and that step. `known` is the model without
+    /// its last term: only the last term's own derivatives are taken here.
+    #[must_use]
+    pub fn outlook(&self, known: &Linearised, model: &Model) -> (f64, Vec<f64>) {
         let p = model.vector();
+        let first = known.information.nrows();
+        let n = p.len();
+        let mut information = DMatrix::zeros(n, n);
+        information
+            .view_mut((0, 0), (first, first))
+            .copy_from(&known.information);
+        let mut gradient = DVector::zeros(n);
+        let mut total = 0.0;
+        for (part, by_run) in self.parts.iter().zip(&known.columns) {
+            total += part.prior(&p);
+            if part.balance == Balance::Tyre {
+                for i in 2..TYRE_BASE {
+                    gradient[i] += p[i] / SHARE_PRIOR.powi(2);
+                }
+            }
+            for (&run, base) in part.runs.iter().zip(by_run) {
+                let (residual, slopes) = if n - first <= NARROW {
+                    part.slopes_from::<NARROW>(model, run, first)
+                } else {
+                    part.slopes_from::<WIDTH>(model, run, first)
+                };
+                let e = part.whiten(&residual, run);
+                total += e.iter().map(|e| loss(*e)).sum::<f64>();
+                let weights: Vec<f64> = e.iter().map(|e| weight(*e)).collect();
+                let score: Vec<f64> = e.iter().zip(&weights).map(|(e, w)| e * w).collect();
+                for (i, column) in base.iter().enumerate() {
+                    gradient[i] += dot(column, &score);
+                }
+                let own: Vec<Vec<f64>> = slopes.iter().map(|c| part.whiten(c, run)).collect();
+                for (i, column) in own.iter().enumerate() {
+                    gradient[first + i] += dot(column, &score);
+                    let weighted: Vec<f64> =
+                        column.iter().zip(&weights).map(|(c, w)| c * w).collect();
+                    for (j, other) in base.iter().chain(&own[..=i]).enumerate() {
+                        let value = dot(&weighted, other);
+                        information[(first + i, j)] += value;
+                        if first + i != j {
+                            information[(j, first + i)] += value;
+                        }
+                    }
+                }
+            }
+        }
+        let bounds = self.bounds(model);
         match bounded_step(&information, &gradient, 1e-6, &p, &bounds) {
             Some(step) => {
                 let limited = DVector::from_iterator(
@@ -348,13 +427,19 @@ impl Joint<'_> {
                         .map(|((x, d), (low, high))| (x + d).clamp(*low, *high) - x),
                 );
                 let predicted =
-                    loss + gradient.dot(&limited) + 0.5 * limited.dot(&(&information * &limited));
+                    total + gradient.dot(&limited) + 0.5 * limited.dot(&(&information * &limited));
                 let moved = p.iter().zip(limited.iter()).map(|(x, d)| x + d).collect();
                 (predicted, moved)
             }
-            None => (loss, p),
+            None => (total, p),
         }
     }
+}
+
+/// A model's whitened derivatives by balance, run and parameter, and its normal matrix.
+pub struct Linearised {
+    columns: Vec<Vec<Vec<Vec<f64>>>>,
+    information: DMatrix<f64>,
 }
 
 /// Dot product in four lanes: fixed order, so results do not depend on the machine's threads.

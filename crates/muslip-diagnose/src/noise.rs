@@ -51,24 +51,31 @@ impl Whitener {
     pub fn apply(&self, x: &[f64], segments: &[Range<usize>], out: &mut Vec<f64>) {
         let order = self.ar.len();
         let scale = 1.0 / self.sigma;
-        let mut history = [0.0; MAX_ORDER];
+        let mut moving = Vec::new();
         for segment in segments {
-            let mut previous = 0.0;
-            for (position, &value) in x[segment.clone()].iter().enumerate() {
-                let u = value + self.theta * previous;
-                previous = u;
-                if position >= order {
-                    let mut e = u;
-                    for (a, h) in self.ar.iter().zip(&history) {
-                        e -= a * h;
-                    }
-                    out.push(e * scale);
-                }
-                for i in (1..order).rev() {
-                    history[i] = history[i - 1];
-                }
-                if order > 0 {
-                    history[0] = u;
+            if segment.len() <= order {
+                continue;
+            }
+            let part = &x[segment.clone()];
+            let u = if self.theta == 0.0 {
+                part
+            } else {
+                let mut previous = 0.0;
+                moving.clear();
+                moving.extend(part.iter().map(|value| {
+                    previous = value + self.theta * previous;
+                    previous
+                }));
+                &moving[..]
+            };
+            // One pass a coefficient: each is a plain sum of two slices, which the compiler vectorises.
+            let from = out.len();
+            out.extend(u[order..].iter().map(|v| v * scale));
+            let tail = &mut out[from..];
+            for (i, a) in self.ar.iter().enumerate() {
+                let share = a * scale;
+                for (e, h) in tail.iter_mut().zip(&u[order - 1 - i..]) {
+                    *e -= share * h;
                 }
             }
         }

@@ -1,6 +1,7 @@
 //! The repaired model as plain data: what `model.toml` holds, and how it predicts a recording.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
 
@@ -288,7 +289,7 @@ impl Repaired {
             context: self.context.clone(),
             extra_names,
             faults: Vec::new(),
-            catalogue: Catalogue::default(),
+            catalogue: Arc::default(),
         };
         let model = self.tyre_model(&data.catalogue, which)?;
         let series = &data.series[0];

@@ -14,13 +14,9 @@ pub struct Form {
 }
 
 /// All forms.
-pub const FORMS: [Form; 4] = [
+pub const FORMS: [Form; 3] = [
     Form {
         orders: 1,
-        phase_per_run: false,
-    },
-    Form {
-        orders: 3,
         phase_per_run: false,
     },
     Form {
