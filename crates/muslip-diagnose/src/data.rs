@@ -2,10 +2,12 @@
 
 use std::sync::Arc;
 
+use rayon::prelude::*;
+
 use crate::campaign::{Rig, Run};
 use crate::mechanism::{Before, Context, Mechanism, catalogue};
 use crate::number::{Dual, Number};
-use crate::prepare::{DataFault, Series, prepare};
+use crate::prepare::{DataFault, MOST_REACH, Series, prepare};
 use crate::smooth::median_in_place;
 
 /// Width of the dual numbers: parameters differentiated in one pass.
@@ -84,6 +86,23 @@ pub struct Data {
     pub catalogue: Arc<Catalogue>,
 }
 
+/// Share of slip noise in the tyre residual above which the smoothing windows are widened.
+const SLIP_NOISE_SHARE: f64 = 0.08;
+
+fn slip_noise_share(series: &[Series], context: &Context) -> f64 {
+    let (mut slip, mut total) = (0.0, 0.0);
+    for s in series {
+        for k in s.tyre.iter().flat_map(Clone::clone) {
+            let own = s.slip_force_noise(k, context).powi(2);
+            if own.is_finite() {
+                slip += own;
+                total += own + s.drag_sigma * s.drag_sigma;
+            }
+        }
+    }
+    if total > 0.0 { slip / total } else { 0.0 }
+}
+
 /// Mean over samples that pass a filter; `fallback` if there are none.
 fn mean(values: impl Iterator<Item = f64>, fallback: f64) -> f64 {
     let (mut sum, mut count) = (0.0, 0.0);
@@ -106,14 +125,27 @@ impl Data {
                 }
             }
         }
-        let mut series = Vec::with_capacity(runs.len());
-        let mut faults = Vec::new();
-        for (index, run) in runs.iter().enumerate() {
-            let (prepared, found) = prepare(rig, run, &extra_names, index);
-            series.push(prepared);
-            faults.extend(found);
-        }
-        let context = Self::context_of(rig, &series);
+        let mut reach_factor = 1.0;
+        let (series, faults, context) = loop {
+            let prepared: Vec<(Series, Vec<DataFault>)> = runs
+                .par_iter()
+                .enumerate()
+                .map(|(index, run)| prepare(rig, run, &extra_names, index, reach_factor))
+                .collect();
+            let (series, faults): (Vec<Series>, Vec<Vec<DataFault>>) = prepared.into_iter().unzip();
+            let context = Context {
+                reach_factor,
+                ..Self::context_of(rig, &series)
+            };
+            // Noise that is left in the slip looks like physics: where it is a good part of the residual, wider
+            // windows cost less than they save.
+            if reach_factor >= MOST_REACH
+                || slip_noise_share(&series, &context) <= SLIP_NOISE_SHARE
+            {
+                break (series, faults.concat(), context);
+            }
+            reach_factor *= 2.0;
+        };
         Self {
             rig: rig.clone(),
             series,
@@ -122,6 +154,12 @@ impl Data {
             faults,
             catalogue: Arc::default(),
         }
+    }
+
+    /// Share of the tyre residual's noise power that comes from noise left in the smoothed slip, 0..=1.
+    #[must_use]
+    pub fn slip_noise_share(&self) -> f64 {
+        slip_noise_share(&self.series, &self.context)
     }
 
     fn context_of(rig: &Rig, series: &[Series]) -> Context {

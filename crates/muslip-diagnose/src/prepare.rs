@@ -19,6 +19,8 @@ const ABSURD: f64 = 1e15;
 const BRIDGE: usize = 4;
 /// Longest half-window of the smoother in s.
 const MAX_REACH_S: f64 = 0.04;
+/// Largest factor by which the windows are widened where slip is noisy.
+pub const MOST_REACH: f64 = 4.0;
 
 /// Something wrong with the recording itself.
 #[derive(Clone, Debug, PartialEq)]
@@ -131,6 +133,23 @@ impl Series {
         } else {
             0.0
         }
+    }
+    /// Standard deviation of the force on the nominal curve from the noise left in the smoothed slip, in N.
+    #[must_use]
+    pub fn slip_force_noise(&self, k: usize, context: &Context) -> f64 {
+        if !self.rolling[k] {
+            return 0.0;
+        }
+        let (v, omega) = (self.speed.smooth[k], self.wheel.smooth[k]);
+        let by_wheel =
+            context.radius / v * self.wheel.sigma * self.wheel.variance_share[k].sqrt();
+        let by_speed = context.radius * omega / (v * v)
+            * self.speed.sigma
+            * self.speed.variance_share[k].sqrt();
+        let [peak, critical] = context.nominal;
+        let x = self.slip(k, context.radius) / critical;
+        let slope = 2.0 * peak / critical * (1.0 - x * x) / (1.0 + x * x).powi(2);
+        self.load.smooth[k] * slope.abs() * by_wheel.hypot(by_speed)
     }
     /// Number of samples usable in the tyre balance.
     #[must_use]
@@ -339,13 +358,15 @@ fn channel(
     }
 }
 
-/// Prepares one run. `extra_names` fixes the order of the other columns over the campaign.
+/// Prepares one run. `extra_names` fixes the order of the other columns over the campaign, `reach_factor`
+/// (1..=[`MOST_REACH`]) widens the smoothing windows.
 #[must_use]
 pub fn prepare(
     rig: &Rig,
     run: &Run,
     extra_names: &[String],
     index: usize,
+    reach_factor: f64,
 ) -> (Series, Vec<DataFault>) {
     let mut faults = Vec::new();
     let time = &run.time_s;
@@ -440,10 +461,11 @@ pub fn prepare(
     let reach: Vec<f64> = (0..n)
         .map(|k| {
             let revolution = core::f64::consts::TAU / omega[k].abs().max(1.0);
-            MAX_REACH_S.min(revolution / 6.0).max(2.2 * typical_dt)
+            reach_factor * MAX_REACH_S.min(revolution / 6.0).max(2.2 * typical_dt)
         })
         .collect();
-    let slow_reach: Vec<f64> = vec![(2.0 * MAX_REACH_S).max(4.2 * typical_dt); n];
+    let slow_reach: Vec<f64> =
+        vec![reach_factor * (2.0 * MAX_REACH_S).max(4.2 * typical_dt); n];
     let wheel = channel(time, omega, &continuous, omega_sigma, &reach);
     let speed = channel(time, v, &continuous, v_sigma, &slow_reach);
     let load = channel(time, load, &continuous, load_sigma, &reach);

@@ -282,7 +282,13 @@ impl Repaired {
             .unwrap_or(self.recordings.len());
         let mut extra_names: Vec<String> = run.extra.iter().map(|(name, _)| name.clone()).collect();
         extra_names.sort();
-        let (series, _) = prepare(&self.rig, &blind, &extra_names, index);
+        let (series, _) = prepare(
+            &self.rig,
+            &blind,
+            &extra_names,
+            index,
+            self.context.reach_factor,
+        );
         let data = Data {
             rig: self.rig.clone(),
             series: vec![series],

@@ -29,7 +29,7 @@ pub fn first_guess(data: &Data, balance: Balance) -> BalanceNoise {
                 let floor = s.drag_sigma.max(1e-6 * data.context.max_drag);
                 (0..s.len())
                     .map(|k| {
-                        let slip = slip_noise(data, s.index, k);
+                        let slip = s.slip_force_noise(k, &data.context);
                         (floor * floor + slip * slip).sqrt()
                     })
                     .collect()
@@ -41,23 +41,6 @@ pub fn first_guess(data: &Data, balance: Balance) -> BalanceNoise {
         whitener: Whitener::unit(),
         scale,
     }
-}
-
-/// Force noise from the noise left in the smoothed slip, on the nominal curve, in N.
-fn slip_noise(data: &Data, run: usize, k: usize) -> f64 {
-    let s = &data.series[run];
-    if !s.rolling[k] {
-        return 0.0;
-    }
-    let v = s.speed.smooth[k];
-    let omega = s.wheel.smooth[k];
-    let radius = data.context.radius;
-    let by_wheel = radius / v * s.wheel.sigma * s.wheel.variance_share[k].sqrt();
-    let by_speed = radius * omega / (v * v) * s.speed.sigma * s.speed.variance_share[k].sqrt();
-    let x = s.slip(k, radius) / data.context.nominal[1];
-    let slope = 2.0 * data.context.nominal[0] / data.context.nominal[1] * (1.0 - x * x)
-        / (1.0 + x * x).powi(2);
-    s.load.smooth[k] * slope.abs() * by_wheel.hypot(by_speed)
 }
 
 /// Columns that together stand for whatever a tyre residual may depend on.
@@ -292,7 +275,7 @@ fn tyre_scale(
                 features.push([
                     1.0,
                     levers.force[run][k].powi(2),
-                    slip_noise(data, run, k).powi(2),
+                    data.series[run].slip_force_noise(k, &data.context).powi(2),
                 ]);
                 squares.push(rest[run][k]);
                 all.push(rest[run][k]);
@@ -355,7 +338,7 @@ fn tyre_scale(
                     let f = [
                         1.0,
                         levers.force[run][k].powi(2),
-                        slip_noise(data, run, k).powi(2),
+                        data.series[run].slip_force_noise(k, &data.context).powi(2),
                     ];
                     let variance = parts[0] * f[0] + parts[1] * f[1] + parts[2] * f[2];
                     if variance.is_finite() {

@@ -6,9 +6,11 @@
 use core::ops::Range;
 
 /// Window half-widths tried, in samples.
-const HALF_WIDTHS: [usize; 14] = [1, 2, 3, 4, 6, 8, 11, 15, 20, 27, 36, 48, 64, 85];
+const HALF_WIDTHS: [usize; 17] = [
+    1, 2, 3, 4, 6, 8, 11, 15, 20, 27, 36, 48, 64, 85, 113, 150, 200,
+];
 /// Half-width of the confidence intervals that must intersect, in standard deviations.
-const CONFIDENCE: f64 = 1.8;
+const CONFIDENCE: f64 = 2.6;
 
 /// A channel after smoothing.
 #[derive(Clone, Debug, Default)]

@@ -145,6 +145,8 @@ pub struct Context {
     pub drag_sigma: f64,
     /// Largest drag reading (99.9th percentile) in N.
     pub max_drag: f64,
+    /// Factor by which the smoothing windows are widened, for slip is noisy here.
+    pub reach_factor: f64,
     /// Work before each run in J and clock offset of each run in s, by position.
     pub before: Vec<Before>,
 }
