@@ -77,6 +77,20 @@ pub struct Search {
     pub count: usize,
 }
 
+impl Joint<'_> {
+    /// The chosen model without one of its mechanisms, the others fitted anew.
+    #[must_use]
+    pub fn without(&self, search: &Search, place: usize) -> Fitted {
+        let mut fewer = search.chosen.fitted.model.clone();
+        fewer.terms.remove(place);
+        if fewer.terms.is_empty() {
+            search.base.fitted.clone()
+        } else {
+            self.fit(&fewer, 12)
+        }
+    }
+}
+
 /// Price of a model's mechanisms in nats.
 #[must_use]
 pub fn price(model: &Model, count: usize) -> f64 {
@@ -188,7 +202,7 @@ fn extended(
 }
 
 /// A fit with its price.
-fn priced(joint: &Joint<'_>, fitted: Fitted) -> Candidate {
+pub(crate) fn candidate(joint: &Joint<'_>, fitted: Fitted) -> Candidate {
     Candidate {
         criterion: fitted.loss + price(&fitted.model, joint.count()),
         ids: fitted.model.ids(&joint.data().catalogue),
@@ -199,14 +213,14 @@ fn priced(joint: &Joint<'_>, fitted: Fitted) -> Candidate {
 /// Keeps the best of each set of mechanisms, sorted by criterion.
 fn keep_best(candidates: Vec<Candidate>) -> Vec<Candidate> {
     let mut kept: Vec<Candidate> = Vec::new();
-    for candidate in candidates {
-        match kept.iter_mut().find(|c| c.ids == candidate.ids) {
+    for one in candidates {
+        match kept.iter_mut().find(|c| c.ids == one.ids) {
             Some(known) => {
-                if candidate.criterion < known.criterion {
-                    *known = candidate;
+                if one.criterion < known.criterion {
+                    *known = one;
                 }
             }
-            None => kept.push(candidate),
+            None => kept.push(one),
         }
     }
     kept.sort_by(|a, b| a.criterion.total_cmp(&b.criterion));
@@ -283,7 +297,7 @@ fn extend(
     }
     let fits: Vec<Candidate> = promising
         .par_iter()
-        .map(|(model, _)| priced(joint, joint.fit(model, 15)))
+        .map(|(model, _)| candidate(joint, joint.fit(model, 15)))
         .collect();
     keep_best(fits)
 }
@@ -303,7 +317,7 @@ fn beam_of(level: &[Candidate], explained: f64, limits: &Limits) -> Vec<Candidat
 #[must_use]
 pub fn search(joint: &Joint<'_>, base: Fitted, limits: &Limits) -> Search {
     let count = joint.count();
-    let base = priced(joint, base);
+    let base = candidate(joint, base);
     let mut starts: Starts = vec![Vec::new(); joint.data().catalogue.entries().len()];
     let mut tried: Vec<Candidate> = Vec::new();
     let mut chosen = base.clone();
@@ -337,7 +351,7 @@ pub fn search(joint: &Joint<'_>, base: Fitted, limits: &Limits) -> Search {
 pub fn refine(joint: &Joint<'_>, search: &Search, limits: &Limits) -> Search {
     let count = joint.count();
     let size = search.chosen.ids.len();
-    let base = priced(joint, joint.fit(&search.base.fitted.model, 15));
+    let base = candidate(joint, joint.fit(&search.base.fitted.model, 15));
     // Sets of the chosen size that were near, and the chosen set's own subsets.
     let reach = 60.0 + 0.35 * (search.base.criterion - search.chosen.criterion);
     let again: Vec<&Candidate> = search
@@ -351,7 +365,7 @@ pub fn refine(joint: &Joint<'_>, search: &Search, limits: &Limits) -> Search {
         .collect();
     let mut tried: Vec<Candidate> = again
         .par_iter()
-        .map(|c| priced(joint, joint.fit(&c.fitted.model, 15)))
+        .map(|c| candidate(joint, joint.fit(&c.fitted.model, 15)))
         .collect();
     tried = keep_best(tried);
     let mut chosen = tried

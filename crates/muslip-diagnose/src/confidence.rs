@@ -95,7 +95,8 @@ pub fn covariance(joint: &Joint<'_>, fitted: &Fitted) -> DMatrix<f64> {
     for part in &joint.parts {
         for &run in part.runs {
             let (e, columns) = part.jacobian(&fitted.model, run);
-            let length = (1.0 / part.data.series[run].typical_dt).clamp(20.0, 5000.0) as usize;
+            let step = part.data.series[run].typical_dt * part.noise.whitener.block as f64;
+            let length = (1.0 / step).clamp(20.0, 5000.0) as usize;
             let score: Vec<f64> = e.iter().map(|e| e * weight(*e)).collect();
             for from in (0..e.len()).step_by(length) {
                 let to = (from + length).min(e.len());

@@ -7,6 +7,7 @@ use crate::mechanism::Balance;
 use crate::model::Model;
 use crate::saturated;
 use crate::split::Split;
+use crate::validation::validated;
 
 /// What wheel and vehicle say.
 pub struct DynamicsStage {
@@ -107,7 +108,7 @@ pub fn analyse(
             .map(|(b, n)| part(data, split, *b, n, chain))
             .collect(),
     };
-    found = refine(&sharper, &found, limits);
+    found = validated(&sharper, refine(&sharper, &found, limits), limits);
     Some(DynamicsStage {
         noise: sharper_noise,
         search: found,

@@ -197,28 +197,40 @@ impl Problem<'_> {
         let mut gradient = DVector::zeros(n);
         let mut total = self.prior(&p);
         for &run in self.runs {
-            let (e, columns) = self.jacobian(model, run);
-            let weights: Vec<f64> = e.iter().map(|e| weight(*e)).collect();
-            total += e.iter().map(|e| loss(*e)).sum::<f64>();
-            let mut weighted = vec![0.0; e.len()];
-            for i in 0..n {
-                for ((w, c), h) in weighted.iter_mut().zip(&columns[i]).zip(&weights) {
-                    *w = c * h;
-                }
-                gradient[i] += dot(&weighted, &e);
-                for j in 0..=i {
-                    let value = dot(&weighted, &columns[j]);
-                    information[(i, j)] += value;
-                    if i != j {
-                        information[(j, i)] += value;
-                    }
-                }
-            }
+            let (own, slope, loss) = self.normal_of(model, run);
+            information += own;
+            gradient += slope;
+            total += loss;
         }
         if self.balance == Balance::Tyre {
             for i in 2..TYRE_BASE {
                 information[(i, i)] += SHARE_PRIOR.powi(-2);
                 gradient[i] += p[i] / SHARE_PRIOR.powi(2);
+            }
+        }
+        (information, gradient, total)
+    }
+
+    /// The same of one run, without the prior.
+    fn normal_of(&self, model: &Model, run: usize) -> (DMatrix<f64>, DVector<f64>, f64) {
+        let (e, columns) = self.jacobian(model, run);
+        let n = columns.len();
+        let mut information = DMatrix::zeros(n, n);
+        let mut gradient = DVector::zeros(n);
+        let weights: Vec<f64> = e.iter().map(|e| weight(*e)).collect();
+        let total = e.iter().map(|e| loss(*e)).sum::<f64>();
+        let mut weighted = vec![0.0; e.len()];
+        for i in 0..n {
+            for ((w, c), h) in weighted.iter_mut().zip(&columns[i]).zip(&weights) {
+                *w = c * h;
+            }
+            gradient[i] += dot(&weighted, &e);
+            for j in 0..=i {
+                let value = dot(&weighted, &columns[j]);
+                information[(i, j)] += value;
+                if i != j {
+                    information[(j, i)] += value;
+                }
             }
         }
         (information, gradient, total)
@@ -268,6 +280,35 @@ impl Joint<'_> {
             sum.2 += loss;
         }
         sum
+    }
+
+    /// Runs that take part.
+    #[must_use]
+    pub fn runs(&self) -> &[usize] {
+        self.parts[0].runs
+    }
+
+    /// Information matrix and gradient of one run over all balances, without the prior.
+    #[must_use]
+    pub fn normal_of(&self, model: &Model, run: usize) -> (DMatrix<f64>, DVector<f64>) {
+        let n = model.vector().len();
+        let mut sum = (DMatrix::zeros(n, n), DVector::zeros(n));
+        for part in &self.parts {
+            let (information, gradient, _) = part.normal_of(model, run);
+            sum.0 += information;
+            sum.1 += gradient;
+        }
+        sum
+    }
+
+    /// Loss of a model on one run in nats, without the prior.
+    #[must_use]
+    pub fn loss_of(&self, model: &Model, run: usize) -> f64 {
+        self.parts
+            .iter()
+            .flat_map(|part| part.innovations(model, run))
+            .map(loss)
+            .sum()
     }
 
     /// Bounds of all parameters of a model.
@@ -463,7 +504,7 @@ pub fn dot(a: &[f64], b: &[f64]) -> f64 {
 }
 
 /// Damped Gauss-Newton step; parameters pushed against a bound are held there and the rest solved again.
-fn bounded_step(
+pub(crate) fn bounded_step(
     information: &DMatrix<f64>,
     gradient: &DVector<f64>,
     damping: f64,

@@ -13,7 +13,7 @@
 //! | the simulation and its balances | [`model`], [`mechanism`], [`number`] |
 //! | noise from the data | [`noise`], [`saturated`], [`omnibus`] |
 //! | joint fit | [`fit`] |
-//! | choice | [`choose`], [`tyre_stage`], [`dynamics_stage`] |
+//! | choice | [`choose`], [`validation`], [`tyre_stage`], [`dynamics_stage`] |
 //! | remainder | [`remainder`] |
 //! | location | [`locate`] |
 //! | how sure, and what was looked for | [`confidence`], [`separating`], [`looked`] |
@@ -51,3 +51,4 @@ pub mod separating;
 pub mod smooth;
 pub mod split;
 pub mod tyre_stage;
+pub mod validation;

@@ -12,12 +12,17 @@ const CLIP: f64 = 3.5;
 /// Innovations beyond this many standard deviations count linearly (Huber 1964).
 pub const HUBER: f64 = 2.2;
 
-/// A stationary noise model: d = (1 − θB)/(1 − Σ aᵢBⁱ) e with white e of standard deviation `sigma`.
+/// A stationary noise model: d = (1 − θB)/(1 − Σ aᵢBⁱ) e with white e of standard deviation `sigma`, for means d
+/// of `block` samples.
 ///
 /// `theta` is the moving-average root that differencing a noisy speed leaves behind; it is zero for
-/// the tyre balance.
+/// the tyre balance. Wheel and vehicle are judged on means over several samples: sample by sample the noise of a
+/// differenced speed drowns the slow noise that any effect has to be told from, and no short autoregression
+/// describes both.
 #[derive(Clone, Debug)]
 pub struct Whitener {
+    /// Samples that are averaged before anything else, at least one.
+    pub block: usize,
     /// Moving-average root, 0..1.
     pub theta: f64,
     /// Autoregressive coefficients.
@@ -31,6 +36,7 @@ impl Whitener {
     #[must_use]
     pub fn unit() -> Self {
         Self {
+            block: 1,
             theta: 0.0,
             ar: Vec::new(),
             sigma: 1.0,
@@ -42,7 +48,7 @@ impl Whitener {
     pub fn count(&self, segments: &[Range<usize>]) -> usize {
         segments
             .iter()
-            .map(|s| s.len().saturating_sub(self.ar.len()))
+            .map(|s| (s.len() / self.block).saturating_sub(self.ar.len()))
             .sum()
     }
 
@@ -52,11 +58,20 @@ impl Whitener {
         let order = self.ar.len();
         let scale = 1.0 / self.sigma;
         let mut moving = Vec::new();
+        let mut means = Vec::new();
         for segment in segments {
-            if segment.len() <= order {
+            let mut part = &x[segment.clone()];
+            if self.block > 1 {
+                means.clear();
+                means.extend(
+                    part.chunks_exact(self.block)
+                        .map(|c| c.iter().sum::<f64>() / self.block as f64),
+                );
+                part = &means;
+            }
+            if part.len() <= order {
                 continue;
             }
-            let part = &x[segment.clone()];
             let u = if self.theta == 0.0 {
                 part
             } else {
@@ -78,14 +93,45 @@ impl Whitener {
                     *e -= share * h;
                 }
             }
+            if self.theta > 0.0 {
+                self.forget_start(tail);
+            }
+        }
+    }
+
+    /// Takes out of a segment's innovations what the unknown sum before its first sample left in them: with a root
+    /// near one it would stay for the whole segment, and look like a constant force.
+    fn forget_start(&self, innovations: &mut [f64]) {
+        let order = self.ar.len() as i32;
+        let gain: f64 = 1.0
+            - self
+                .ar
+                .iter()
+                .zip(1..)
+                .map(|(a, i)| a * self.theta.powi(-i))
+                .sum::<f64>();
+        let mut trace = gain * self.theta.powi(order + 1);
+        let (mut along, mut power) = (0.0, 0.1);
+        let first = trace;
+        for e in innovations.iter() {
+            along += trace * e;
+            power += trace * trace;
+            trace *= self.theta;
+        }
+        let share = along / power;
+        trace = first;
+        for e in innovations {
+            *e -= share * trace;
+            trace *= self.theta;
         }
     }
 
     /// Fits the autoregression (order by BIC) and the innovation size to residuals in which no
-    /// mismatch is left, for a given moving-average root.
+    /// mismatch is left, for a given block and moving-average root.
     #[must_use]
-    pub fn fit(residual: &[f64], segments: &[Range<usize>], theta: f64) -> Self {
+    pub fn fit(residual: &[f64], segments: &[Range<usize>], block: usize, theta: f64) -> Self {
         let unit = Self {
+            block,
             theta,
             ar: Vec::new(),
             sigma: 1.0,
@@ -103,8 +149,9 @@ impl Whitener {
         let mut start = 0;
         let mut count = 0.0;
         for segment in segments {
-            let part = &u[start..start + segment.len()];
-            start += segment.len();
+            let length = segment.len() / block;
+            let part = &u[start..start + length];
+            start += length;
             count += part.len() as f64;
             for (lag, c) in covariance.iter_mut().enumerate() {
                 if part.len() > lag {
@@ -125,6 +172,7 @@ impl Whitener {
             }
         }
         let mut fitted = Self {
+            block,
             theta,
             ar: best.1,
             sigma: 1.0,
@@ -253,7 +301,7 @@ mod tests {
         }
         let all = 0..x.len();
         let segments = [all];
-        let w = Whitener::fit(&x, &segments, 0.0);
+        let w = Whitener::fit(&x, &segments, 1, 0.0);
         assert!((w.ar[0] - 0.8).abs() < 0.03, "{w:?}");
         assert!((w.sigma - 25.0).abs() < 0.6, "{w:?}");
         let mut e = Vec::new();

@@ -38,8 +38,21 @@ pub fn first_guess(data: &Data, balance: Balance) -> BalanceNoise {
         })
         .collect();
     BalanceNoise {
-        whitener: Whitener::unit(),
+        whitener: Whitener {
+            block: block(data, balance),
+            ..Whitener::unit()
+        },
         scale,
+    }
+}
+
+/// Span in s over which wheel and vehicle are averaged.
+const BLOCK_S: f64 = 0.008;
+
+fn block(data: &Data, balance: Balance) -> usize {
+    match balance {
+        Balance::Tyre => 1,
+        _ => ((BLOCK_S / data.context.dt) as usize).max(1),
     }
 }
 
@@ -135,9 +148,10 @@ fn wheel_columns(data: &Data) -> Vec<Column> {
     };
     let scale = data.context.mean_load * data.context.radius;
     let mut columns = vec![
+        // Not the drag: with it, torque and acceleration the columns would hold the smoothed residual itself,
+        // and take its slow noise for an effect. A wrong scale of the drag shows in the torque as well.
         each(&|s, k| s.wheel.rate[k]),
         each(&|_, _| scale),
-        each(&|s, k| s.drag_smooth.get(k).copied().unwrap_or(0.0)),
         each(&|s, k| s.wheel.smooth[k]),
         each(&|s, k| s.load.smooth[k]),
     ];
@@ -165,7 +179,6 @@ fn vehicle_columns(data: &Data) -> Vec<Column> {
         each(&|_, _| scale),
         each(&|s, k| s.speed.smooth[k]),
         each(&|s, k| s.speed.smooth[k].powi(2)),
-        each(&|s, k| s.drag_smooth.get(k).copied().unwrap_or(0.0)),
         each(&|s, k| s.speed.rate[k]),
         each(&|s, k| scale * (k as f64 / s.len().max(1) as f64)),
     ]
@@ -192,6 +205,7 @@ pub fn estimate(guessed: &Problem<'_>, fitted: &Fitted) -> BalanceNoise {
     // Regress in the guessed scale but without its colour, so that columns keep their full weight.
     let white = BalanceNoise {
         whitener: Whitener {
+            block: guess.whitener.block,
             sigma: guess.whitener.sigma.max(1e-300),
             ..Whitener::unit()
         },
@@ -249,12 +263,53 @@ pub fn estimate(guessed: &Problem<'_>, fitted: &Fitted) -> BalanceNoise {
     } else {
         &ROOTS
     };
-    let whitener = roots
+    let block = block(data, balance);
+    let mut whitener = roots
         .iter()
-        .map(|theta| Whitener::fit(&joined, &segments, *theta))
+        .map(|theta| Whitener::fit(&joined, &segments, block, *theta))
         .min_by(|a, b| a.sigma.total_cmp(&b.sigma))
         .unwrap_or_else(Whitener::unit);
+    whitener.sigma *= slow_excess(&whitener, &joined, &segments, data.context.dt, columns.len());
     BalanceNoise { whitener, scale }
+}
+
+/// Spans in s over which innovations are summed to see whether slow noise is left in them.
+const SLOW_S: [f64; 3] = [0.06, 0.2, 0.6];
+/// Fewest sums from which their variance is read.
+const FEWEST_SUMS: usize = 24;
+
+/// Standard deviation of sums of innovations over a while against that of white ones, at least one. The fast noise
+/// of a differenced speed decides the colour's fit, but the effects that are looked for are slow: what counts
+/// is the level there.
+fn slow_excess(
+    whitener: &Whitener,
+    x: &[f64],
+    segments: &[core::ops::Range<usize>],
+    dt: f64,
+    columns: usize,
+) -> f64 {
+    let mut e = Vec::with_capacity(x.len());
+    whitener.apply(x, segments, &mut e);
+    for v in &mut e {
+        *v = v.clamp(-3.5, 3.5);
+    }
+    let mut most: f64 = 1.0;
+    for span in SLOW_S {
+        let length = (span / (dt * whitener.block as f64)).round() as usize;
+        if length < 4 || e.len() / length < FEWEST_SUMS {
+            continue;
+        }
+        let sums: Vec<f64> = e
+            .chunks_exact(length)
+            .map(|c| c.iter().sum::<f64>() / (length as f64).sqrt())
+            .collect();
+        // The columns have taken part of the slow noise with them.
+        let freedom = (sums.len() as f64 - columns as f64).max(0.4 * sums.len() as f64);
+        let variance = sums.iter().map(|s| s * s).sum::<f64>() / freedom;
+        if std::env::var_os("V").is_some() { eprintln!("SLOW {length} {variance:.2} of {} columns {columns}", sums.len()); }
+        most = most.max(variance);
+    }
+    most.sqrt()
 }
 
 /// Size of the tyre noise by sample: a constant, a share of the force, and the propagated slip noise.

@@ -10,6 +10,7 @@ use crate::omnibus::Levers;
 use crate::remainder::{Remainder, candidates, counterparts};
 use crate::saturated;
 use crate::split::Split;
+use crate::validation::validated;
 
 /// What the tyre balance says.
 pub struct TyreStage {
@@ -42,6 +43,12 @@ pub fn problem<'a>(data: &'a Data, split: &'a Split, noise: &'a BalanceNoise) ->
         runs: &split.fit_runs,
         segments: split.fit.of(Balance::Tyre),
         chain: None,
+    }
+}
+
+fn joint_under<'a>(data: &'a Data, split: &'a Split, noise: &'a BalanceNoise) -> Joint<'a> {
+    Joint {
+        parts: vec![problem(data, split, noise)],
     }
 }
 
@@ -116,9 +123,7 @@ pub fn analyse(
     progress(0.1, "fitting the base law");
     let base = base_fit(&guessed);
     let noise = saturated::estimate(&guessed.parts[0], &base);
-    let joint = Joint {
-        parts: vec![problem(data, split, &noise)],
-    };
+    let joint = joint_under(data, split, &noise);
     let base = joint.fit(&base.model, 20);
     if !speaks(&joint, &base) {
         return None;
@@ -129,10 +134,7 @@ pub fn analyse(
     if !found.chosen.ids.is_empty() {
         progress(0.5, "judging again under the noise that is left");
         noise = saturated::estimate(&joint.parts[0], &found.chosen.fitted);
-        let sharper = Joint {
-            parts: vec![problem(data, split, &noise)],
-        };
-        found = refine(&sharper, &found, limits);
+        found = refine(&joint_under(data, split, &noise), &found, limits);
     }
     if !found.chosen.ids.is_empty()
         && let Some(cross) = CrossEvidence::new(
@@ -144,10 +146,9 @@ pub fn analyse(
     {
         found = cross.rerank(found);
     }
+    found = validated(&joint_under(data, split, &noise), found, limits);
     progress(0.65, "looking at what is left");
-    let joint = Joint {
-        parts: vec![problem(data, split, &noise)],
-    };
+    let joint = joint_under(data, split, &noise);
     Some(remainders(&joint, found, noise.clone(), limits))
 }
 
