@@ -5,7 +5,7 @@ use crate::data::Data;
 use crate::fit::{BalanceNoise, Fitted, Joint, Problem};
 use crate::mechanism::Balance;
 use crate::model::Model;
-use crate::saturated;
+use crate::saturated::{self, Slow};
 use crate::split::Split;
 use crate::validation::validated;
 
@@ -58,6 +58,7 @@ fn noises(
     split: &Split,
     model: &Model,
     chain: Option<&[Vec<f64>]>,
+    slow: Slow,
 ) -> Vec<(Balance, BalanceNoise)> {
     available(data, split)
         .into_iter()
@@ -69,7 +70,7 @@ fn noises(
                 loss: 0.0,
                 information: nalgebra::DMatrix::zeros(0, 0),
             };
-            (balance, saturated::estimate(&problem, &fitted))
+            (balance, saturated::estimate(&problem, &fitted, slow))
         })
         .collect()
 }
@@ -83,7 +84,7 @@ pub fn analyse(
     chain: Option<&[Vec<f64>]>,
 ) -> Option<DynamicsStage> {
     let model = Model::default();
-    let noise = noises(data, split, &model, chain);
+    let noise = noises(data, split, &model, chain, Slow::Ignored);
     if noise.is_empty() {
         return None;
     }
@@ -101,7 +102,7 @@ pub fn analyse(
             search: found,
         });
     }
-    let sharper_noise = noises(data, split, &found.chosen.fitted.model, chain);
+    let sharper_noise = noises(data, split, &found.chosen.fitted.model, chain, Slow::Counted);
     let sharper = Joint {
         parts: sharper_noise
             .iter()
@@ -140,7 +141,7 @@ impl<'a> CrossEvidence<'a> {
         limits: &Limits,
         chain: Option<&[Vec<f64>]>,
     ) -> Option<Self> {
-        let noise = noises(data, split, &Model::default(), chain);
+        let noise = noises(data, split, &Model::default(), chain, Slow::Counted);
         (!noise.is_empty()).then(|| Self {
             data,
             split,
@@ -188,7 +189,7 @@ impl<'a> CrossEvidence<'a> {
         let mut worst = f64::NEG_INFINITY;
         for (i, chain) in compared.iter().zip(&chains) {
             let change = match chain {
-                Some(chain) => self.criterion(Some(chain)) - without,
+                Some(chain) => { let c = self.criterion(Some(chain)); if std::env::var_os("V").is_some() { eprintln!("CROSS {:?} tyre {:.1} dyn {c:.1} without {without:.1}", found.tried[*i].ids, found.tried[*i].criterion); } c - without },
                 None => 0.0,
             };
             if change.is_finite() {

@@ -21,6 +21,7 @@ pub struct BalanceNoise {
 }
 
 /// A balance of a campaign with its noise: what a model is fitted to.
+#[derive(Clone, Copy)]
 pub struct Problem<'a> {
     /// The campaign.
     pub data: &'a Data,

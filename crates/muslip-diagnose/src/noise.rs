@@ -7,6 +7,8 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 /// Longest autoregression tried.
 const MAX_ORDER: usize = 6;
+/// The same for means over blocks, of which there are few.
+const MAX_BLOCK_ORDER: usize = 10;
 /// Residuals are clipped at this many standard deviations before the autoregression is fitted.
 const CLIP: f64 = 3.5;
 /// Innovations beyond this many standard deviations count linearly (Huber 1964).
@@ -48,7 +50,7 @@ impl Whitener {
     pub fn count(&self, segments: &[Range<usize>]) -> usize {
         segments
             .iter()
-            .map(|s| (s.len() / self.block).saturating_sub(self.ar.len()))
+            .map(|s| self.averages(s.len()).saturating_sub(self.ar.len()))
             .sum()
     }
 
@@ -62,11 +64,7 @@ impl Whitener {
         for segment in segments {
             let mut part = &x[segment.clone()];
             if self.block > 1 {
-                means.clear();
-                means.extend(
-                    part.chunks_exact(self.block)
-                        .map(|c| c.iter().sum::<f64>() / self.block as f64),
-                );
+                self.average(part, &mut means);
                 part = &means;
             }
             if part.len() <= order {
@@ -96,6 +94,34 @@ impl Whitener {
             if self.theta > 0.0 {
                 self.forget_start(tail);
             }
+        }
+    }
+
+    /// Number of averages of a segment of so many samples.
+    #[must_use]
+    pub fn averages(&self, samples: usize) -> usize {
+        if self.block > 1 {
+            (samples / self.block).saturating_sub(1)
+        } else {
+            samples
+        }
+    }
+
+    /// Averages with triangular weights two blocks wide, one a block: the imbalance of a differenced speed becomes
+    /// that of the difference of its means over two blocks, and no sample of the speed is lost.
+    fn average(&self, x: &[f64], out: &mut Vec<f64>) {
+        out.clear();
+        let m = self.block;
+        let share = 1.0 / (m * m) as f64;
+        for pair in 0..self.averages(x.len()) {
+            let both = &x[pair * m..(pair + 2) * m];
+            let (rising, falling) = both.split_at(m);
+            let mut sum = 0.0;
+            for (i, (a, b)) in rising.iter().zip(falling).enumerate() {
+                // Weights 1..m, then m−1..0: a sample of the difference lies between two of the speed.
+                sum += (i + 1) as f64 * a + (m - 1 - i) as f64 * b;
+            }
+            out.push(sum * share);
         }
     }
 
@@ -145,11 +171,12 @@ impl Whitener {
         for value in &mut u {
             *value = value.clamp(-CLIP * level, CLIP * level);
         }
-        let mut covariance = [0.0; MAX_ORDER + 1];
+        let most = if block > 1 { MAX_BLOCK_ORDER } else { MAX_ORDER };
+        let mut covariance = vec![0.0; most + 1];
         let mut start = 0;
         let mut count = 0.0;
         for segment in segments {
-            let length = segment.len() / block;
+            let length = unit.averages(segment.len());
             let part = &u[start..start + length];
             start += length;
             count += part.len() as f64;
@@ -164,7 +191,7 @@ impl Whitener {
             }
         }
         let mut best = (f64::INFINITY, Vec::new());
-        for order in 0..=MAX_ORDER {
+        for order in 0..=most {
             let (ar, variance) = levinson(&covariance, order);
             let bic = count * variance.max(1e-300).ln() + order as f64 * count.max(2.0).ln();
             if bic < best.0 - 1e-9 {

@@ -46,14 +46,17 @@ pub fn first_guess(data: &Data, balance: Balance) -> BalanceNoise {
     }
 }
 
-/// Span in s over which wheel and vehicle are averaged.
-const BLOCK_S: f64 = 0.008;
+/// Span in s over which the wheel's imbalance is averaged, and the vehicle's, which changes more slowly.
+const WHEEL_BLOCK_S: f64 = 0.008;
+const VEHICLE_BLOCK_S: f64 = 0.024;
 
 fn block(data: &Data, balance: Balance) -> usize {
-    match balance {
-        Balance::Tyre => 1,
-        _ => ((BLOCK_S / data.context.dt) as usize).max(1),
-    }
+    let span = match balance {
+        Balance::Tyre => return 1,
+        Balance::Wheel => WHEEL_BLOCK_S,
+        Balance::Vehicle => VEHICLE_BLOCK_S,
+    };
+    ((span / data.context.dt) as usize).max(1)
 }
 
 /// Columns that together stand for whatever a tyre residual may depend on.
@@ -78,6 +81,22 @@ fn tyre_columns(problem: &Problem<'_>, model: &Model) -> Vec<Column> {
     add(Variable::SlipRate, Action::Friction, 3);
     for i in 0..data.extra_names.len().min(4) {
         add(Variable::Column(i), Action::Friction, 4);
+    }
+    // A slip read too high or too low, by load and by speed: a wrong radius.
+    for variable in [Variable::NormalForce, Variable::VehicleSpeed] {
+        if let Some(g) = group(problem, &levers, &variable, Action::CriticalSlip, 3) {
+            for mut column in g.columns {
+                for (values, s) in column.iter_mut().zip(&data.series) {
+                    for (k, x) in values.iter_mut().enumerate() {
+                        // The lever of the critical slip holds the slip as a factor.
+                        let slip = s.slip(k, data.context.radius);
+                        let least = 0.02 * data.context.nominal[1];
+                        *x *= data.context.nominal[1] / slip.abs().max(least).copysign(slip);
+                    }
+                }
+                columns.push(column);
+            }
+        }
     }
     let each = |f: &dyn Fn(usize, usize) -> f64| -> Column {
         data.series
@@ -197,17 +216,51 @@ pub fn free_columns(data: &Data, balance: Balance) -> Vec<Column> {
     columns
 }
 
+/// Whether slow noise that the colour does not describe is added to the noise's size.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Slow {
+    /// No: while mechanisms are looked for, it may be one of them.
+    Ignored,
+    /// Yes: once the best explanation is at hand, what is left of it is noise.
+    Counted,
+}
+
 /// Noise of a balance given a fitted model: regresses its residual on everything, reads size and colour
 /// off the rest.
 #[must_use]
-pub fn estimate(guessed: &Problem<'_>, fitted: &Fitted) -> BalanceNoise {
+pub fn estimate(guessed: &Problem<'_>, fitted: &Fitted, slow: Slow) -> BalanceNoise {
+    if guessed.balance == Balance::Tyre {
+        return estimate_once(guessed, fitted, slow);
+    }
+    // What is regressed under the wrong colour leaves slow effects behind, which then pass for slow noise: the
+    // noise of a differenced speed is assumed first, and what is found then taken in its place.
+    let mut noise = guessed.noise.clone();
+    noise.whitener.theta = 0.98;
+    for pass in 0..DYNAMIC_PASSES {
+        let problem = Problem {
+            noise: &noise,
+            ..*guessed
+        };
+        let slow = if pass + 1 == DYNAMIC_PASSES { slow } else { Slow::Ignored };
+        noise = estimate_once(&problem, fitted, slow);
+    }
+    noise
+}
+
+/// Times that the noise of wheel and vehicle is estimated, each under the colour found before.
+const DYNAMIC_PASSES: usize = 3;
+
+fn estimate_once(guessed: &Problem<'_>, fitted: &Fitted, slow: Slow) -> BalanceNoise {
     let (data, balance, runs, guess) = (guessed.data, guessed.balance, guessed.runs, guessed.noise);
-    // Regress in the guessed scale but without its colour, so that columns keep their full weight.
+    // The tyre's is regressed in the guessed scale but without its colour, so that columns keep their full weight.
     let white = BalanceNoise {
-        whitener: Whitener {
-            block: guess.whitener.block,
-            sigma: guess.whitener.sigma.max(1e-300),
-            ..Whitener::unit()
+        whitener: if balance == Balance::Tyre {
+            Whitener {
+                sigma: guess.whitener.sigma.max(1e-300),
+                ..Whitener::unit()
+            }
+        } else {
+            guess.whitener.clone()
         },
         scale: guess.scale.clone(),
     };
@@ -264,12 +317,34 @@ pub fn estimate(guessed: &Problem<'_>, fitted: &Fitted) -> BalanceNoise {
         &ROOTS
     };
     let block = block(data, balance);
-    let mut whitener = roots
+    let candidates: Vec<(Whitener, f64)> = roots
         .iter()
-        .map(|theta| Whitener::fit(&joined, &segments, block, *theta))
-        .min_by(|a, b| a.sigma.total_cmp(&b.sigma))
-        .unwrap_or_else(Whitener::unit);
-    whitener.sigma *= slow_excess(&whitener, &joined, &segments, data.context.dt, columns.len());
+        .map(|theta| {
+            let whitener = Whitener::fit(&joined, &segments, block, *theta);
+            let slow = slow_excess(
+                &whitener,
+                &joined,
+                &segments,
+                data.context.dt,
+                columns.len(),
+            );
+            (whitener, slow)
+        })
+        .collect();
+    let smallest = candidates
+        .iter()
+        .map(|(w, _)| w.sigma)
+        .fold(f64::INFINITY, f64::min);
+    // Among roots that describe the noise about as well, the one that describes its slow part.
+    let (mut whitener, excess) = candidates
+        .into_iter()
+        .filter(|(w, _)| w.sigma <= 1.03 * smallest)
+        .min_by(|a, b| a.1.ln().abs().total_cmp(&b.1.ln().abs()))
+        .unwrap_or_else(|| (Whitener::unit(), 1.0));
+    // The tyre's colour is fitted at full rate and holds; the slow level of a differenced speed's noise is read here.
+    let least = if balance == Balance::Tyre { 1.0 } else { 0.5 };
+    let most = if slow == Slow::Counted { f64::INFINITY } else { 1.0 };
+    whitener.sigma *= excess.clamp(least, most);
     BalanceNoise { whitener, scale }
 }
 
@@ -278,7 +353,7 @@ const SLOW_S: [f64; 3] = [0.06, 0.2, 0.6];
 /// Fewest sums from which their variance is read.
 const FEWEST_SUMS: usize = 24;
 
-/// Standard deviation of sums of innovations over a while against that of white ones, at least one. The fast noise
+/// Standard deviation of sums of innovations over a while against that of white ones; one where there are too few. The fast noise
 /// of a differenced speed decides the colour's fit, but the effects that are looked for are slow: what counts
 /// is the level there.
 fn slow_excess(
@@ -293,7 +368,7 @@ fn slow_excess(
     for v in &mut e {
         *v = v.clamp(-3.5, 3.5);
     }
-    let mut most: f64 = 1.0;
+    let mut most: f64 = 0.0;
     for span in SLOW_S {
         let length = (span / (dt * whitener.block as f64)).round() as usize;
         if length < 4 || e.len() / length < FEWEST_SUMS {
@@ -306,10 +381,9 @@ fn slow_excess(
         // The columns have taken part of the slow noise with them.
         let freedom = (sums.len() as f64 - columns as f64).max(0.4 * sums.len() as f64);
         let variance = sums.iter().map(|s| s * s).sum::<f64>() / freedom;
-        if std::env::var_os("V").is_some() { eprintln!("SLOW {length} {variance:.2} of {} columns {columns}", sums.len()); }
         most = most.max(variance);
     }
-    most.sqrt()
+    if most > 0.0 { most.sqrt() } else { 1.0 }
 }
 
 /// Size of the tyre noise by sample: a constant, a share of the force, and the propagated slip noise.

@@ -8,7 +8,7 @@ use crate::mechanism::{Balance, Stage};
 use crate::model::{Model, TYRE_BASE, tyre};
 use crate::omnibus::Levers;
 use crate::remainder::{Remainder, candidates, counterparts};
-use crate::saturated;
+use crate::saturated::{self, Slow};
 use crate::split::Split;
 use crate::validation::validated;
 
@@ -122,7 +122,7 @@ pub fn analyse(
     }
     progress(0.1, "fitting the base law");
     let base = base_fit(&guessed);
-    let noise = saturated::estimate(&guessed.parts[0], &base);
+    let noise = saturated::estimate(&guessed.parts[0], &base, Slow::Ignored);
     let joint = joint_under(data, split, &noise);
     let base = joint.fit(&base.model, 20);
     if !speaks(&joint, &base) {
@@ -130,10 +130,9 @@ pub fn analyse(
     }
     progress(0.2, "screening mechanisms");
     let mut found = search(&joint, base, limits);
-    let mut noise = noise.clone();
+    progress(0.5, "judging again under the noise that is left");
+    let noise = saturated::estimate(&joint.parts[0], &found.chosen.fitted, Slow::Counted);
     if !found.chosen.ids.is_empty() {
-        progress(0.5, "judging again under the noise that is left");
-        noise = saturated::estimate(&joint.parts[0], &found.chosen.fitted);
         found = refine(&joint_under(data, split, &noise), &found, limits);
     }
     if !found.chosen.ids.is_empty()

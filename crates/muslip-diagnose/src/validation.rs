@@ -6,6 +6,7 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::choose::{Limits, Search, candidate, price, required};
 use crate::fit::{Fitted, Joint, bounded_step};
+use crate::noise::robust_sigma;
 
 /// Fewest runs with which leaving one out says anything.
 const FEWEST_RUNS: usize = 3;
@@ -67,6 +68,47 @@ fn left_out(joint: &Joint<'_>, fitted: &Fitted) -> Vec<f64> {
         .collect()
 }
 
+/// Span over which a balance's residual is averaged to say how large an effect is beside the noise, in s.
+const EFFECT_SPAN_S: f64 = 0.05;
+/// Smallest effect on wheel or vehicle worth naming, root mean square, in standard deviations of such means. The
+/// slow noise there is so small that effects far below anything that matters would be significant.
+const LEAST_EFFECT: f64 = 0.15;
+
+/// Root mean square of what a mechanism changes, over the noise of means over [`EFFECT_SPAN_S`]; in the balance where
+/// it is largest.
+fn effect(joint: &Joint<'_>, full: &Fitted, fewer: &Fitted) -> f64 {
+    joint
+        .parts
+        .iter()
+        .map(|part| {
+            let (mut change, mut noise, mut count) = (0.0, Vec::new(), 0.0);
+            for &run in part.runs {
+                let with = part.residual(&full.model, &full.model.vector(), run);
+                let without = part.residual(&fewer.model, &fewer.model.vector(), run);
+                let length =
+                    ((EFFECT_SPAN_S / part.data.series[run].typical_dt) as usize).max(1);
+                for segment in part.segments(run) {
+                    for (a, b) in with[segment.clone()]
+                        .chunks_exact(length)
+                        .zip(without[segment.clone()].chunks_exact(length))
+                    {
+                        let mean = |x: &[f64]| x.iter().sum::<f64>() / length as f64;
+                        change += (mean(b) - mean(a)).powi(2);
+                        noise.push(mean(a));
+                        count += 1.0;
+                    }
+                }
+            }
+            let sigma = robust_sigma(&noise);
+            if count > 0.0 && sigma > 0.0 {
+                (change / count).sqrt() / sigma
+            } else {
+                0.0
+            }
+        })
+        .fold(0.0, f64::max)
+}
+
 /// Takes out of the chosen set what does not hold on runs left out in turn, weakest first.
 #[must_use]
 pub fn validated(joint: &Joint<'_>, mut found: Search, limits: &Limits) -> Search {
@@ -95,7 +137,16 @@ pub fn validated(joint: &Joint<'_>, mut found: Search, limits: &Limits) -> Searc
                     - price(&without.model, found.count))
                 .max(0.0);
                 let needed = KEPT_SHARE * required(limits, found.count, explained);
-                let excess = (total - needed).min(HARMED_SHARE * size - harmed);
+                let mut excess = (total - needed).min(HARMED_SHARE * size - harmed);
+                if !joint.is_tyre() {
+                    let size = effect(joint, full, &without);
+                    if std::env::var_os("V").is_some() {
+                        eprintln!("VALID size {size:.3}");
+                    }
+                    if size < LEAST_EFFECT {
+                        excess = excess.min((size - LEAST_EFFECT) * without.loss);
+                    }
+                }
                 (without, excess)
             })
             .collect();
