@@ -329,11 +329,6 @@ pub fn search(joint: &Joint<'_>, base: Fitted, limits: &Limits) -> Search {
         let Some(best) = level.first().cloned() else {
             break;
         };
-        if std::env::var_os("V").is_some() {
-            for c in level.iter().take(4) {
-                eprintln!("SEARCH tyre {} {:?} gain {:.1} needed {:.1} {:?}", joint.is_tyre(), c.ids, chosen.criterion - c.criterion, needed, c.fitted.model.terms.iter().map(|t| t.parameters.clone()).collect::<Vec<_>>());
-            }
-        }
         tried.extend(level.iter().cloned());
         if chosen.criterion - best.criterion < needed {
             break;

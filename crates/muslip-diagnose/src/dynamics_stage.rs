@@ -189,7 +189,7 @@ impl<'a> CrossEvidence<'a> {
         let mut worst = f64::NEG_INFINITY;
         for (i, chain) in compared.iter().zip(&chains) {
             let change = match chain {
-                Some(chain) => { let c = self.criterion(Some(chain)); if std::env::var_os("V").is_some() { eprintln!("CROSS {:?} tyre {:.1} dyn {c:.1} without {without:.1}", found.tried[*i].ids, found.tried[*i].criterion); } c - without },
+                Some(chain) => self.criterion(Some(chain)) - without,
                 None => 0.0,
             };
             if change.is_finite() {

@@ -127,9 +127,6 @@ pub fn validated(joint: &Joint<'_>, mut found: Search, limits: &Limits) -> Searc
                 }
                 let by_run = held_out(joint, full, &without);
                 let total: f64 = by_run.iter().sum();
-                if std::env::var_os("V").is_some() {
-                    eprintln!("VALID {:?} drop {:.1} held out {:.1?} params {:?} required {:.1}", mechanism.id(), without.loss - full.loss, by_run, full.model.terms[place].parameters, required(limits, found.count, 0.0));
-                }
                 let size: f64 = by_run.iter().map(|g| g.abs()).sum();
                 let harmed: f64 = by_run.iter().filter(|g| **g < -CHANCE).map(|g| -g).sum();
                 let explained = (found.base.criterion
@@ -140,9 +137,6 @@ pub fn validated(joint: &Joint<'_>, mut found: Search, limits: &Limits) -> Searc
                 let mut excess = (total - needed).min(HARMED_SHARE * size - harmed);
                 if !joint.is_tyre() {
                     let size = effect(joint, full, &without);
-                    if std::env::var_os("V").is_some() {
-                        eprintln!("VALID size {size:.3}");
-                    }
                     if size < LEAST_EFFECT {
                         excess = excess.min((size - LEAST_EFFECT) * without.loss);
                     }
