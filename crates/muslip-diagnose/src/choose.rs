@@ -271,8 +271,13 @@ fn extend(
             } else {
                 own
             };
-            let (model, predicted, order) =
-                extended(joint, &linear[place], &beam[place].fitted.model, entry, from)?;
+            let (model, predicted, order) = extended(
+                joint,
+                &linear[place],
+                &beam[place].fitted.model,
+                entry,
+                from,
+            )?;
             Some((model, predicted, order))
         })
         .collect();

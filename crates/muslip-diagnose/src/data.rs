@@ -139,8 +139,7 @@ impl Data {
             };
             // Noise that is left in the slip looks like physics: where it is a good part of the residual, wider
             // windows cost less than they save.
-            if reach_factor >= MOST_REACH
-                || slip_noise_share(&series, &context) <= SLIP_NOISE_SHARE
+            if reach_factor >= MOST_REACH || slip_noise_share(&series, &context) <= SLIP_NOISE_SHARE
             {
                 break (series, faults.concat(), context);
             }

@@ -309,9 +309,25 @@ impl Outcome<'_> {
     }
 
     fn unexplained(&self) -> Vec<Unexplained> {
-        let Some(stage) = self.tyre else {
-            return Vec::new();
-        };
+        let mut all: Vec<Unexplained> = self
+            .tyre
+            .map_or_else(Vec::new, |stage| Self::unexplained_tyre(stage));
+        if let Some(stage) = self.dynamics {
+            let explained = (stage.search.base.fitted.loss
+                - stage.search.chosen.fitted.loss)
+                .max(0.0);
+            all.extend(stage.unexplained.iter().map(|r| Unexplained {
+                balance: r.balance.as_str(),
+                variable: r.word.clone(),
+                form: r.form.clone(),
+                z: (2.0 * r.gain.max(0.0)).sqrt(),
+                share: (r.gain / (r.gain + explained).max(1e-9)).clamp(0.0, 1.0),
+            }));
+        }
+        all
+    }
+
+    fn unexplained_tyre(stage: &TyreStage) -> Vec<Unexplained> {
         let explained = (stage.search.base.fitted.loss - stage.fitted.loss).max(0.0);
         stage
             .unexplained
@@ -480,7 +496,7 @@ impl Outcome<'_> {
             where_regions.extend(regions(data, "tyre", &difference, &usable, sigma));
         }
         if let Some(stage) = self.dynamics
-            && !stage.search.chosen.ids.is_empty()
+            && !(stage.search.chosen.ids.is_empty() && stage.unexplained.is_empty())
         {
             self.locate_dynamics(stage, &mut found, &mut where_regions);
         }
@@ -505,12 +521,20 @@ impl Outcome<'_> {
                 _ => (1.0, "vehicle_speed_m_s"),
             };
             let sigma = force_sigma * unit;
-            let gain = (stage.search.base.fitted.loss - stage.search.chosen.fitted.loss).max(0.0);
+            let gain = (stage.search.base.fitted.loss - stage.search.chosen.fitted.loss).max(0.0)
+                + stage.unexplained.iter().map(|r| r.gain).sum::<f64>();
             let difference: Vec<Vec<f64>> = (0..data.series.len())
                 .map(|run| {
                     let after = part.residual(model, &model.vector(), run);
                     let before = part.residual(&Model::default(), &[] as &[f64], run);
-                    before.iter().zip(after).map(|(b, a)| a - b).collect()
+                    let mut change: Vec<f64> =
+                        before.iter().zip(after).map(|(b, a)| a - b).collect();
+                    for r in stage.unexplained.iter().filter(|r| r.balance == part.balance) {
+                        for (c, e) in change.iter_mut().zip(&r.effect[run]) {
+                            *c -= e;
+                        }
+                    }
+                    change
                 })
                 .collect();
             let usable: Vec<_> = data

@@ -1,7 +1,8 @@
 //! The wheel and vehicle balances, diagnosed together: a wrong drag scale breaks both.
 
-use crate::choose::{Limits, Search, refine, search};
+use crate::choose::{Limits, Search, candidate, refine, required, search};
 use crate::data::Data;
+use crate::dynamics_remainder::{DynamicRemainder, candidates};
 use crate::fit::{BalanceNoise, Fitted, Joint, Problem};
 use crate::mechanism::Balance;
 use crate::model::Model;
@@ -15,6 +16,8 @@ pub struct DynamicsStage {
     pub noise: Vec<(Balance, BalanceNoise)>,
     /// All sets tried and the one chosen.
     pub search: Search,
+    /// Dependences that no mechanism explains.
+    pub unexplained: Vec<DynamicRemainder>,
 }
 
 /// Shortest balance that is looked at, in innovations.
@@ -96,24 +99,63 @@ pub fn analyse(
     };
     let base = joint.fit(&model, 1);
     let mut found = search(&joint, base, limits);
-    if found.chosen.ids.is_empty() {
-        return Some(DynamicsStage {
-            noise,
-            search: found,
-        });
-    }
-    let sharper_noise = noises(data, split, &found.chosen.fitted.model, chain, Slow::Counted);
+    let sharper_noise = noises(
+        data,
+        split,
+        &found.chosen.fitted.model,
+        chain,
+        Slow::Counted,
+    );
     let sharper = Joint {
         parts: sharper_noise
             .iter()
             .map(|(b, n)| part(data, split, *b, n, chain))
             .collect(),
     };
-    found = validated(&sharper, refine(&sharper, &found, limits), limits);
+    if found.chosen.ids.is_empty() {
+        found = under(&sharper, found);
+    } else {
+        found = validated(&sharper, refine(&sharper, &found, limits), limits);
+    }
+    let unexplained = left_over(&sharper, &mut found, limits);
     Some(DynamicsStage {
         noise: sharper_noise,
         search: found,
+        unexplained,
     })
+}
+
+/// The search's base judged under other noise.
+fn under(joint: &Joint<'_>, mut found: Search) -> Search {
+    found.base = candidate(joint, joint.fit(&found.base.fitted.model, 1));
+    found.chosen = found.base.clone();
+    found.tried.clear();
+    found
+}
+
+/// Share of a recorded column's worth that mechanisms must reach to be preferred to it.
+const MECHANISM_SHARE: f64 = 0.85;
+
+/// What the chosen mechanisms leave over; they give way to one recorded column that says more than all of them.
+fn left_over(joint: &Joint<'_>, found: &mut Search, limits: &Limits) -> Vec<DynamicRemainder> {
+    if limits.ablation.remainder {
+        return Vec::new();
+    }
+    let explained = found.base.criterion - found.chosen.criterion;
+    if !found.chosen.ids.is_empty() {
+        let free = candidates(joint, &found.base.fitted.model, limits);
+        if let Some(rival) = free.into_iter().find(|r| r.recorded)
+            && rival.worth * MECHANISM_SHARE > explained
+        {
+            found.chosen = found.base.clone();
+            return vec![rival];
+        }
+    }
+    candidates(joint, &found.chosen.fitted.model, limits)
+        .into_iter()
+        .find(|r| r.worth >= required(limits, found.count, 2.0 * explained))
+        .into_iter()
+        .collect()
 }
 
 /// What wheel and vehicle say of a fault in the drag channel: a force that the cell reports late breaks

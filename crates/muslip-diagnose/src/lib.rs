@@ -14,7 +14,7 @@
 //! | noise from the data | [`noise`], [`saturated`], [`omnibus`] |
 //! | joint fit | [`fit`] |
 //! | choice | [`choose`], [`validation`], [`tyre_stage`], [`dynamics_stage`] |
-//! | remainder | [`remainder`] |
+//! | remainder | [`remainder`], [`dynamics_remainder`] |
 //! | location | [`locate`] |
 //! | how sure, and what was looked for | [`confidence`], [`separating`], [`looked`] |
 //! | what each part is worth | [`ablation`] |
@@ -33,6 +33,7 @@ pub mod choose;
 pub mod confidence;
 pub mod data;
 pub mod diagnose;
+pub mod dynamics_remainder;
 pub mod dynamics_stage;
 pub mod fit;
 pub mod locate;

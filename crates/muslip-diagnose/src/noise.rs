@@ -171,7 +171,11 @@ impl Whitener {
         for value in &mut u {
             *value = value.clamp(-CLIP * level, CLIP * level);
         }
-        let most = if block > 1 { MAX_BLOCK_ORDER } else { MAX_ORDER };
+        let most = if block > 1 {
+            MAX_BLOCK_ORDER
+        } else {
+            MAX_ORDER
+        };
         let mut covariance = vec![0.0; most + 1];
         let mut start = 0;
         let mut count = 0.0;

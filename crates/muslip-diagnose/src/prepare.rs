@@ -141,8 +141,7 @@ impl Series {
             return 0.0;
         }
         let (v, omega) = (self.speed.smooth[k], self.wheel.smooth[k]);
-        let by_wheel =
-            context.radius / v * self.wheel.sigma * self.wheel.variance_share[k].sqrt();
+        let by_wheel = context.radius / v * self.wheel.sigma * self.wheel.variance_share[k].sqrt();
         let by_speed = context.radius * omega / (v * v)
             * self.speed.sigma
             * self.speed.variance_share[k].sqrt();
@@ -464,8 +463,7 @@ pub fn prepare(
             reach_factor * MAX_REACH_S.min(revolution / 6.0).max(2.2 * typical_dt)
         })
         .collect();
-    let slow_reach: Vec<f64> =
-        vec![reach_factor * (2.0 * MAX_REACH_S).max(4.2 * typical_dt); n];
+    let slow_reach: Vec<f64> = vec![reach_factor * (2.0 * MAX_REACH_S).max(4.2 * typical_dt); n];
     let wheel = channel(time, omega, &continuous, omega_sigma, &reach);
     let speed = channel(time, v, &continuous, v_sigma, &slow_reach);
     let load = channel(time, load, &continuous, load_sigma, &reach);

@@ -241,7 +241,11 @@ pub fn estimate(guessed: &Problem<'_>, fitted: &Fitted, slow: Slow) -> BalanceNo
             noise: &noise,
             ..*guessed
         };
-        let slow = if pass + 1 == DYNAMIC_PASSES { slow } else { Slow::Ignored };
+        let slow = if pass + 1 == DYNAMIC_PASSES {
+            slow
+        } else {
+            Slow::Ignored
+        };
         noise = estimate_once(&problem, fitted, slow);
     }
     noise
@@ -343,7 +347,11 @@ fn estimate_once(guessed: &Problem<'_>, fitted: &Fitted, slow: Slow) -> BalanceN
         .unwrap_or_else(|| (Whitener::unit(), 1.0));
     // The tyre's colour is fitted at full rate and holds; the slow level of a differenced speed's noise is read here.
     let least = if balance == Balance::Tyre { 1.0 } else { 0.5 };
-    let most = if slow == Slow::Counted { f64::INFINITY } else { 1.0 };
+    let most = if slow == Slow::Counted {
+        f64::INFINITY
+    } else {
+        1.0
+    };
     whitener.sigma *= excess.clamp(least, most);
     BalanceNoise { whitener, scale }
 }

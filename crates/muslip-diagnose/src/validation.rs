@@ -69,10 +69,10 @@ fn left_out(joint: &Joint<'_>, fitted: &Fitted) -> Vec<f64> {
 }
 
 /// Span over which a balance's residual is averaged to say how large an effect is beside the noise, in s.
-const EFFECT_SPAN_S: f64 = 0.05;
+pub const EFFECT_SPAN_S: f64 = 0.05;
 /// Smallest effect on wheel or vehicle worth naming, root mean square, in standard deviations of such means. The
 /// slow noise there is so small that effects far below anything that matters would be significant.
-const LEAST_EFFECT: f64 = 0.15;
+pub const LEAST_EFFECT: f64 = 0.15;
 
 /// Root mean square of what a mechanism changes, over the noise of means over [`EFFECT_SPAN_S`]; in the balance where
 /// it is largest.
@@ -85,8 +85,7 @@ fn effect(joint: &Joint<'_>, full: &Fitted, fewer: &Fitted) -> f64 {
             for &run in part.runs {
                 let with = part.residual(&full.model, &full.model.vector(), run);
                 let without = part.residual(&fewer.model, &fewer.model.vector(), run);
-                let length =
-                    ((EFFECT_SPAN_S / part.data.series[run].typical_dt) as usize).max(1);
+                let length = ((EFFECT_SPAN_S / part.data.series[run].typical_dt) as usize).max(1);
                 for segment in part.segments(run) {
                     for (a, b) in with[segment.clone()]
                         .chunks_exact(length)
@@ -129,10 +128,9 @@ pub fn validated(joint: &Joint<'_>, mut found: Search, limits: &Limits) -> Searc
                 let total: f64 = by_run.iter().sum();
                 let size: f64 = by_run.iter().map(|g| g.abs()).sum();
                 let harmed: f64 = by_run.iter().filter(|g| **g < -CHANCE).map(|g| -g).sum();
-                let explained = (found.base.criterion
-                    - without.loss
-                    - price(&without.model, found.count))
-                .max(0.0);
+                let explained =
+                    (found.base.criterion - without.loss - price(&without.model, found.count))
+                        .max(0.0);
                 let needed = KEPT_SHARE * required(limits, found.count, explained);
                 let mut excess = (total - needed).min(HARMED_SHARE * size - harmed);
                 if !joint.is_tyre() {

@@ -17,7 +17,7 @@ impl Describe for AeroDrag {
     fn parameters(&self, context: &Context) -> Vec<Parameter> {
         // Up to one g at the campaign's largest speed.
         let most = 9.81 * context.mass / context.max_speed.max(0.5).powi(2);
-        vec![Parameter::new("coefficient", "kg/m", -most, most)]
+        vec![Parameter::new("coefficient", "kg/m", 0.0, most)]
     }
     fn starts(
         &self,

@@ -40,7 +40,7 @@ impl Describe for BearingDrag {
     }
     fn parameters(&self, context: &Context) -> Vec<Parameter> {
         let scale = (context.mean_load * context.radius).max(1e-9);
-        let mut all = vec![Parameter::new("torque", "N m", -0.5 * scale, 0.5 * scale)];
+        let mut all = vec![Parameter::new("torque", "N m", 0.0, 0.5 * scale)];
         match self.form {
             Form::Constant => {}
             Form::Speed => all.push(Parameter::new(

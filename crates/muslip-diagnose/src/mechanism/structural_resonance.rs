@@ -18,7 +18,7 @@ impl Describe for StructuralResonance {
     fn parameters(&self, context: &Context) -> Vec<Parameter> {
         vec![
             Parameter::new("frequency", "Hz", 2.0, 0.45 / context.dt),
-            Parameter::new("damping_ratio", "1", 0.002, 0.5),
+            Parameter::new("damping_ratio", "1", 0.002, 0.3),
         ]
     }
     fn starts(
