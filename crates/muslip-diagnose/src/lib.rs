@@ -14,7 +14,7 @@
 //! | noise from the data | [`noise`], [`saturated`], [`omnibus`] |
 //! | joint fit | [`fit`] |
 //! | choice | [`choose`], [`validation`], [`tyre_stage`], [`dynamics_stage`] |
-//! | remainder | [`remainder`], [`dynamics_remainder`] |
+//! | remainder | [`remainder`], [`lines`], [`dynamics_remainder`] |
 //! | location | [`locate`] |
 //! | how sure, and what was looked for | [`confidence`], [`separating`], [`looked`] |
 //! | what each part is worth | [`ablation`] |
@@ -36,6 +36,7 @@ pub mod diagnose;
 pub mod dynamics_remainder;
 pub mod dynamics_stage;
 pub mod fit;
+pub mod lines;
 pub mod locate;
 pub mod looked;
 pub mod mechanism;

@@ -5,6 +5,7 @@ use rayon::prelude::*;
 
 use crate::data::Data;
 use crate::fit::Problem;
+use crate::lines::{self, Line, PLACES, phase_of, strongest};
 use crate::mechanism::{Context, Id};
 use crate::model::Model;
 use crate::omnibus::{Action, Column, Group, Levers, Regression, Variable, group};
@@ -117,48 +118,16 @@ fn spline(
 fn periodic(problem: &Problem<'_>, regression: &Regression, levers: &Levers) -> Vec<Remainder> {
     let data = problem.data;
     let mut found = Vec::new();
-    for (word, action) in [
-        ("time_s", Action::Force),
-        ("time_s", Action::Friction),
-        ("distance_m", Action::Friction),
-        ("wheel_angle_rad", Action::Force),
-        ("wheel_angle_rad", Action::Friction),
-    ] {
-        let phase = |run: usize| -> Vec<f64> {
-            let s = &data.series[run];
-            match word {
-                "time_s" => s.time.iter().map(|t| t - s.time[0]).collect(),
-                "distance_m" => s.distance.clone(),
-                _ => s.angle.clone(),
-            }
-        };
-        let Some(rate) = strongest_line(problem, regression, levers, action, &phase) else {
+    for (word, action) in PLACES {
+        let phase = |run: usize| phase_of(data, word, run);
+        let left: Vec<&[f64]> = (0..problem.runs.len())
+            .map(|place| regression.innovations(place))
+            .collect();
+        let lever = |run: usize, k: usize| levers.of(data, action, run, k);
+        let Some(Line { rate, .. }) = strongest(problem, &left, &lever, &phase) else {
             continue;
         };
-        // A phase of its own for each run: the start of a recording is no event of the rig.
-        let mut columns: Vec<Column> = Vec::new();
-        for own in problem.runs {
-            for quadrature in [false, true] {
-                columns.push(
-                    (0..data.series.len())
-                        .map(|run| {
-                            if run != *own {
-                                return vec![0.0; data.series[run].len()];
-                            }
-                            phase(run)
-                                .iter()
-                                .enumerate()
-                                .map(|(k, u)| {
-                                    let (sin, cos) = (rate * u).sin_cos();
-                                    levers.of(data, action, run, k)
-                                        * if quadrature { sin } else { cos }
-                                })
-                                .collect()
-                        })
-                        .collect(),
-                );
-            }
-        }
+        let columns = lines::columns(problem, rate, &lever, &phase);
         let references: Vec<&Column> = columns.iter().collect();
         let fit = regression.on(problem, &references);
         let amplitude = {
@@ -202,84 +171,6 @@ fn periodic(problem: &Problem<'_>, regression: &Regression, levers: &Levers) -> 
 
 fn count_lines(problem: &Problem<'_>) -> usize {
     problem.count().max(2)
-}
-
-/// Rate (rad per unit of the phase variable) at which the residual, seen through the lever of an action,
-/// has most power over all runs: a coarse scan by Goertzel-like recursions on a common grid of rates.
-fn strongest_line(
-    problem: &Problem<'_>,
-    regression: &Regression,
-    levers: &Levers,
-    action: Action,
-    phase: &dyn Fn(usize) -> Vec<f64>,
-) -> Option<f64> {
-    let data = problem.data;
-    // Residual times lever over variance, on a uniform grid of the phase variable, by run.
-    let mut span: f64 = 0.0;
-    let mut step = f64::INFINITY;
-    let mut parts: Vec<(Vec<f64>, Vec<f64>, Vec<f64>)> = Vec::new();
-    for (place, &run) in problem.runs.iter().enumerate() {
-        let u = phase(run);
-        let e = regression.innovations(place);
-        let mut values = Vec::new();
-        let mut at = Vec::new();
-        let mut power = Vec::new();
-        let order = problem.noise.whitener.ar.len();
-        let mut i = 0;
-        for segment in problem.segments(run) {
-            for k in segment.clone().skip(order) {
-                let lever = levers.of(data, action, run, k) / problem.noise.scale[run][k];
-                at.push(u[k]);
-                values.push(e[i].clamp(-4.0, 4.0) * lever);
-                power.push(lever * lever);
-                i += 1;
-            }
-        }
-        let (Some(first), Some(last)) = (at.first(), at.last()) else {
-            continue;
-        };
-        if last > first {
-            span = span.max(last - first);
-            step = step.min((last - first) / at.len() as f64);
-            parts.push((at, values, power));
-        }
-    }
-    if !(span > 0.0) || parts.is_empty() || !step.is_finite() {
-        return None;
-    }
-    // Bins a little finer than the samples, a power of two long.
-    let length = ((span / step) as usize + 1)
-        .next_power_of_two()
-        .min(1 << 17);
-    let bin = span / (length - 1) as f64;
-    let mut spectrum = vec![0.0; length / 2 + 1];
-    let mut planner = realfft::RealFftPlanner::<f64>::new();
-    let plan = planner.plan_fft_forward(2 * length);
-    let mut input = plan.make_input_vec();
-    let mut output = plan.make_output_vec();
-    let mut total = vec![0.0; length + 1];
-    for (at, values, power) in &parts {
-        input.fill(0.0);
-        let origin = at[0];
-        for (u, v) in at.iter().zip(values) {
-            let b = (((u - origin) / bin) as usize).min(length - 1);
-            input[b] += v;
-        }
-        plan.process(&mut input, &mut output).ok()?;
-        let own: f64 = power.iter().sum();
-        if own > 0.0 {
-            for (t, c) in total.iter_mut().zip(&output) {
-                *t += c.norm_sqr() / own;
-            }
-        }
-    }
-    spectrum.resize(total.len(), 0.0);
-    // Slow variation is for the splines: at least six periods in the longest run, and below a third of the
-    // sampling rate.
-    let low = 12;
-    let high = (total.len() as f64 * 0.6 * (bin / step).min(1.0)) as usize;
-    let best = (low..high.max(low)).max_by(|a, b| total[*a].total_cmp(&total[*b]))?;
-    Some(core::f64::consts::TAU * best as f64 / (2.0 * length as f64 * bin))
 }
 
 /// Mechanisms that say the same as a dependence on this variable.

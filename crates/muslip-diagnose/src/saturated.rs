@@ -6,6 +6,7 @@
 
 use crate::data::Data;
 use crate::fit::{BalanceNoise, Fitted, Problem};
+use crate::lines::{self, PLACES, phase_of, strongest};
 use crate::mechanism::Balance;
 use crate::model::Model;
 use crate::noise::{Whitener, robust_sigma};
@@ -79,8 +80,12 @@ fn tyre_columns(problem: &Problem<'_>, model: &Model) -> Vec<Column> {
     add(Variable::Distance, Action::Friction, 12);
     add(Variable::SlipRate, Action::CriticalSlip, 3);
     add(Variable::SlipRate, Action::Friction, 3);
+    add(Variable::SinceOnset, Action::Friction, 4);
+    add(Variable::NormalForceRate, Action::Friction, 3);
     for i in 0..data.extra_names.len().min(4) {
         add(Variable::Column(i), Action::Friction, 4);
+        add(Variable::Column(i), Action::CriticalSlip, 3);
+        add(Variable::Column(i), Action::Force, 3);
     }
     // A slip read too high or too low, by load and by speed: a wrong radius.
     for variable in [Variable::NormalForce, Variable::VehicleSpeed] {
@@ -210,6 +215,34 @@ pub fn free_columns(data: &Data, balance: Balance) -> Vec<Column> {
         Balance::Wheel => wheel_columns(data),
         _ => vehicle_columns(data),
     };
+    for i in 0..data.extra_names.len().min(4) {
+        let all = data.series.iter().flat_map(|s| &s.extra[i]).copied();
+        let (low, high) = all
+            .filter(|x| x.is_finite())
+            .fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| {
+                (a.min(x), b.max(x))
+            });
+        if !(high > low) {
+            continue;
+        }
+        for power in [1, 2] {
+            columns.push(
+                data.series
+                    .iter()
+                    .map(|s| {
+                        s.extra[i]
+                            .iter()
+                            .map(|x| {
+                                data.context.mean_load
+                                    * data.context.radius
+                                    * (2.0 * (x - low) / (high - low) - 1.0).powi(power)
+                            })
+                            .collect()
+                    })
+                    .collect(),
+            );
+        }
+    }
     for x in columns.iter_mut().flatten().flatten() {
         *x = if x.is_finite() { *x } else { 0.0 };
     }
@@ -282,22 +315,13 @@ fn estimate_once(guessed: &Problem<'_>, fitted: &Fitted, slow: Slow) -> BalanceN
     };
     columns.truncate((problem.count() / 12).max(2));
     let regression = Regression::new(&problem, &fitted.model);
-    let references: Vec<&Column> = columns.iter().collect();
-    let found = regression.on(&problem, &references);
-    let mut rest: Vec<Vec<f64>> = vec![Vec::new(); data.series.len()];
-    for &run in runs {
-        let (mut residual, own_columns) = problem.slopes(&fitted.model, run);
-        for (column, c) in own_columns.iter().zip(&found.own) {
-            for (r, x) in residual.iter_mut().zip(column) {
-                *r += c * x;
-            }
+    let mut rest = left_over(&problem, &regression, fitted, &columns);
+    if balance == Balance::Tyre {
+        let lines = lines_in(&problem, fitted, &rest);
+        if !lines.is_empty() {
+            columns.extend(lines);
+            rest = left_over(&problem, &regression, fitted, &columns);
         }
-        for (column, c) in columns.iter().zip(&found.coefficients) {
-            for (r, x) in residual.iter_mut().zip(&column[run]) {
-                *r -= c * x;
-            }
-        }
-        rest[run] = residual;
     }
     let scale = match balance {
         Balance::Tyre => tyre_scale(data, &problem, fitted, &rest, runs),
@@ -354,6 +378,63 @@ fn estimate_once(guessed: &Problem<'_>, fitted: &Fitted, slow: Slow) -> BalanceN
     };
     whitener.sigma *= excess.clamp(least, most);
     BalanceNoise { whitener, scale }
+}
+
+/// What is left of a residual when it is regressed on columns, the model's own parameters free alongside; by run.
+fn left_over(
+    problem: &Problem<'_>,
+    regression: &Regression,
+    fitted: &Fitted,
+    columns: &[Column],
+) -> Vec<Vec<f64>> {
+    let references: Vec<&Column> = columns.iter().collect();
+    let found = regression.on(problem, &references);
+    let mut rest: Vec<Vec<f64>> = vec![Vec::new(); problem.data.series.len()];
+    for &run in problem.runs {
+        let (mut residual, own_columns) = problem.slopes(&fitted.model, run);
+        for (column, c) in own_columns.iter().zip(&found.own) {
+            for (r, x) in residual.iter_mut().zip(column) {
+                *r += c * x;
+            }
+        }
+        for (column, c) in columns.iter().zip(&found.coefficients) {
+            for (r, x) in residual.iter_mut().zip(&column[run]) {
+                *r -= c * x;
+            }
+        }
+        rest[run] = residual;
+    }
+    rest
+}
+
+/// Columns of the lines that stand out of what is left: an autoregression would take them for colour.
+fn lines_in(problem: &Problem<'_>, fitted: &Fitted, rest: &[Vec<f64>]) -> Vec<Column> {
+    let data = problem.data;
+    let levers = Levers::new(data, &fitted.model);
+    let left: Vec<Vec<f64>> = problem
+        .runs
+        .iter()
+        .map(|&run| {
+            problem
+                .segments(run)
+                .iter()
+                .flat_map(Clone::clone)
+                .map(|k| rest[run][k] / problem.noise.scale[run][k])
+                .collect()
+        })
+        .collect();
+    let left: Vec<&[f64]> = left.iter().map(Vec::as_slice).collect();
+    let mut found = Vec::new();
+    for (word, action) in PLACES {
+        let lever = |run: usize, k: usize| levers.of(data, action, run, k);
+        let phase = |run: usize| phase_of(data, word, run);
+        if let Some(line) = strongest(problem, &left, &lever, &phase)
+            && line.significant
+        {
+            found.extend(lines::columns(problem, line.rate, &lever, &phase));
+        }
+    }
+    found
 }
 
 /// Spans in s over which innovations are summed to see whether slow noise is left in them.
