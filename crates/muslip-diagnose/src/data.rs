@@ -126,33 +126,54 @@ impl Data {
             }
         }
         let mut reach_factor = 1.0;
-        let (series, faults, context) = loop {
-            let prepared: Vec<(Series, Vec<DataFault>)> = runs
-                .par_iter()
-                .enumerate()
-                .map(|(index, run)| prepare(rig, run, &extra_names, index, reach_factor))
-                .collect();
-            let (series, faults): (Vec<Series>, Vec<Vec<DataFault>>) = prepared.into_iter().unzip();
-            let context = Context {
-                reach_factor,
-                ..Self::context_of(rig, &series)
-            };
+        loop {
+            let data = Self::prepared(rig, runs, &extra_names, reach_factor);
             // Noise that is left in the slip looks like physics: where it is a good part of the residual, wider
             // windows cost less than they save.
-            if reach_factor >= MOST_REACH || slip_noise_share(&series, &context) <= SLIP_NOISE_SHARE
-            {
-                break (series, faults.concat(), context);
+            if reach_factor >= MOST_REACH || data.slip_noise_share() <= SLIP_NOISE_SHARE {
+                return data;
             }
             reach_factor *= 2.0;
+        }
+    }
+
+    fn prepared(rig: &Rig, runs: &[Run], extra_names: &[String], reach_factor: f64) -> Self {
+        let prepared: Vec<(Series, Vec<DataFault>)> = runs
+            .par_iter()
+            .enumerate()
+            .map(|(index, run)| prepare(rig, run, extra_names, index, reach_factor))
+            .collect();
+        let (series, faults): (Vec<Series>, Vec<Vec<DataFault>>) = prepared.into_iter().unzip();
+        let context = Context {
+            reach_factor,
+            ..Self::context_of(rig, &series)
         };
         Self {
             rig: rig.clone(),
             series,
             context,
-            extra_names,
-            faults,
+            extra_names: extra_names.to_vec(),
+            faults: faults.concat(),
             catalogue: Arc::default(),
         }
+    }
+
+    /// The same campaign smoothed over windows wider or narrower by a factor, everything else as it was.
+    #[must_use]
+    pub fn smoothed_otherwise(&self, runs: &[Run], factor: f64) -> Self {
+        let reach_factor = self.context.reach_factor * factor;
+        let mut other = Self::prepared(&self.rig, runs, &self.extra_names, reach_factor);
+        other.context = Context {
+            reach_factor,
+            ..self.context.clone()
+        };
+        for (new, old) in other.series.iter_mut().zip(&self.series) {
+            // The same samples must be judged.
+            new.tyre.clone_from(&old.tyre);
+            new.rolling.clone_from(&old.rolling);
+            new.still.clone_from(&old.still);
+        }
+        other
     }
 
     /// Share of the tyre residual's noise power that comes from noise left in the smoothed slip, 0..=1.

@@ -50,7 +50,7 @@ pub fn diagnose_without(
         ablation,
         ..Limits::default()
     };
-    let tyre = tyre_stage::analyse(&data, &split, &limits, &progress);
+    let tyre = tyre_stage::analyse(&data, runs, &split, &limits, &progress);
     progress(0.75, "wheel and vehicle");
     let chain = tyre
         .as_ref()

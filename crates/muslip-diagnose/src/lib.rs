@@ -13,7 +13,7 @@
 //! | the simulation and its balances | [`model`], [`mechanism`], [`number`] |
 //! | noise from the data | [`noise`], [`saturated`], [`omnibus`] |
 //! | joint fit | [`fit`] |
-//! | choice | [`choose`], [`validation`], [`tyre_stage`], [`dynamics_stage`] |
+//! | choice | [`choose`], [`validation`], [`otherwise`], [`tyre_stage`], [`dynamics_stage`] |
 //! | remainder | [`remainder`], [`lines`], [`dynamics_remainder`] |
 //! | location | [`locate`] |
 //! | how sure, and what was looked for | [`confidence`], [`separating`], [`looked`] |
@@ -44,6 +44,7 @@ pub mod model;
 pub mod noise;
 pub mod number;
 pub mod omnibus;
+pub mod otherwise;
 pub mod outcome;
 pub mod prepare;
 pub mod remainder;

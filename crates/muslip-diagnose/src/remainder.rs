@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use crate::data::Data;
 use crate::fit::Problem;
 use crate::lines::{self, Line, PLACES, phase_of, strongest};
-use crate::mechanism::{Context, Id};
+use crate::mechanism::Id;
 use crate::model::Model;
 use crate::omnibus::{Action, Column, Group, Levers, Regression, Variable, group};
 use crate::repaired::Correction;
@@ -35,14 +35,24 @@ impl Remainder {
     #[must_use]
     pub fn worth(&self, count: usize) -> f64 {
         let price = 0.5 * self.rank as f64 * (count.max(2) as f64).ln() + 8.0;
-        (self.gain - price).min(self.held_out)
+        (self.gain - price).min(LEFT_OUT_SHARE * self.held_out)
+    }
+
+    /// Whether it depends on a column that the contract does not name.
+    #[must_use]
+    pub fn recorded(&self) -> bool {
+        matches!(self.variable, Some(Variable::Column(_)))
     }
 }
 
+/// A dependence on what hardly changes within a run has to extrapolate to the run left out: it may gain that much
+/// less there.
+const LEFT_OUT_SHARE: f64 = 1.6;
+
 /// Number of hat functions of a variable.
-fn resolution(variable: &Variable) -> usize {
+pub(crate) fn resolution(variable: &Variable) -> usize {
     match variable {
-        Variable::Slip => 14,
+        Variable::Slip | Variable::SlipRate => 14,
         Variable::Distance => 14,
         Variable::Time | Variable::SinceOnset => 9,
         _ => 7,
@@ -85,7 +95,7 @@ pub fn candidates(problem: &Problem<'_>, model: &Model) -> Vec<Remainder> {
     found
 }
 
-fn spline(
+pub(crate) fn spline(
     problem: &Problem<'_>,
     regression: &Regression,
     variable: &Variable,
@@ -175,8 +185,7 @@ fn count_lines(problem: &Problem<'_>) -> usize {
 
 /// Mechanisms that say the same as a dependence on this variable.
 #[must_use]
-pub fn counterparts(variable: &str, context: &Context) -> &'static [Id] {
-    let _ = context;
+pub fn counterparts(variable: &str) -> &'static [Id] {
     match variable {
         "slip" => &[Id::CurveShape, Id::EffectiveRadius, Id::RollingResistance],
         "sliding_speed_m_s" => &[Id::SpeedSensitivity, Id::CurveShape, Id::ThermalFade],

@@ -1,12 +1,14 @@
 //! The tyre balance: base fit, noise, mechanisms, and what they leave.
 
 use crate::choose::{Candidate, Limits, Search, refine, required, search};
+use crate::campaign::Run;
 use crate::data::Data;
 use crate::dynamics_stage::CrossEvidence;
 use crate::fit::{BalanceNoise, Fitted, Joint, Problem};
 use crate::mechanism::{Balance, Stage};
 use crate::model::{Model, TYRE_BASE, tyre};
 use crate::omnibus::Levers;
+use crate::otherwise::Otherwise;
 use crate::remainder::{Remainder, candidates, counterparts};
 use crate::saturated::{self, Slow};
 use crate::split::Split;
@@ -32,6 +34,20 @@ pub struct TyreStage {
 
 /// Fraction of a free dependence's gain that a set of mechanisms must reach to be preferred to it.
 const MECHANISM_SHARE: f64 = 0.85;
+/// The same of a dependence on a recorded column: that it fits at all is no chance.
+const RECORDED_SHARE: f64 = 1.0;
+/// The same where one mechanism says much the same as the free dependence.
+const COUNTERPART_SHARE: f64 = 0.7;
+/// Fraction of the strongest dependence that one on a recorded column must reach to be preferred to it.
+const RECORDED_PREFERENCE: f64 = 0.75;
+
+/// The dependence that mechanisms have to compete with.
+fn strongest_rival(free: &[Remainder], count: usize) -> Option<&Remainder> {
+    let top = free.first()?;
+    free.iter()
+        .find(|r| r.recorded() && r.worth(count) >= RECORDED_PREFERENCE * top.worth(count))
+        .or(Some(top))
+}
 
 /// A problem over the fitted part of the campaign.
 #[must_use]
@@ -109,6 +125,7 @@ pub fn chain(data: &Data, model: &Model) -> Option<Vec<Vec<f64>>> {
 #[must_use]
 pub fn analyse(
     data: &Data,
+    runs: &[Run],
     split: &Split,
     limits: &Limits,
     progress: &dyn Fn(f64, &str),
@@ -145,10 +162,18 @@ pub fn analyse(
     {
         found = cross.rerank(found);
     }
-    found = validated(&joint_under(data, split, &noise), found, limits);
-    progress(0.65, "looking at what is left");
     let joint = joint_under(data, split, &noise);
-    Some(remainders(&joint, found, noise.clone(), limits))
+    found = validated(&joint, found, limits);
+    let mut otherwise = Otherwise::new(data, runs, split, &noise);
+    found = otherwise.kept(&joint, found);
+    progress(0.65, "looking at what is left");
+    Some(remainders(
+        &joint,
+        found,
+        noise.clone(),
+        limits,
+        &mut otherwise,
+    ))
 }
 
 /// Whether the recordings say anything about friction: a law must do better than no force at all.
@@ -166,10 +191,10 @@ fn remainders(
     mut found: Search,
     noise: BalanceNoise,
     limits: &Limits,
+    otherwise: &mut Otherwise<'_>,
 ) -> TyreStage {
     let problem = &joint.parts[0];
     let count = found.count;
-    let data = joint.data();
     let explained = found.base.criterion - found.chosen.criterion;
     let dependences = |model: &Model| {
         if limits.ablation.remainder {
@@ -182,26 +207,41 @@ fn remainders(
     let mut unexplained: Vec<Remainder> = Vec::new();
     let mut corrections: Vec<Remainder> = Vec::new();
     if found.chosen.ids.is_empty() {
+        if std::env::var_os("V").is_some() {
+            for f in left.iter().take(5) { eprintln!("LEFT {} {} {:?} gain {:.0} worth {:.0} held {:.0} needed {:.0}", f.word, f.correction.acts_on, f.variable, f.gain, f.worth(count), f.held_out, required(limits, count, 0.0)); }
+        }
         if let Some(top) = left.first()
             && top.worth(count) >= required(limits, count, 0.0)
+            && otherwise.holds(joint, &found.base.fitted.model, top)
         {
             unexplained.push(top.clone());
             corrections.push(top.clone());
         }
     } else {
         // Does one free dependence account for more than the mechanisms do?
-        let free = dependences(&found.base.fitted.model);
-        let rival = free.first().filter(|top| {
-            top.worth(count) * MECHANISM_SHARE > explained
-                && !counterparts(&top.word, &data.context)
-                    .iter()
-                    .any(|id| found.chosen.ids.contains(id))
+        let free = candidates(problem, &found.base.fitted.model);
+        let rival = strongest_rival(&free, count).filter(|top| {
+            let counterpart = counterparts(&top.word)
+                .iter()
+                .any(|id| found.chosen.ids.contains(id));
+            // A mechanism that says much the same has the better of it, unless it takes several.
+            let share = match (top.recorded(), counterpart, found.chosen.ids.len()) {
+                (true, ..) => RECORDED_SHARE,
+                (false, true, 1) => COUNTERPART_SHARE,
+                _ => MECHANISM_SHARE,
+            };
+            top.worth(count) * share > explained
         });
+        if std::env::var_os("V").is_some() {
+            for f in free.iter().take(5) { eprintln!("FREE {} {} {:?} gain {:.0} worth {:.0} held {:.0} | explained {:.0} by {:?}", f.word, f.correction.acts_on, f.variable, f.gain, f.worth(count), f.held_out, explained, found.chosen.ids); }
+            for f in left.iter().take(5) { eprintln!("LEFT {} {} {:?} gain {:.0} worth {:.0} held {:.0} needed {:.0}", f.word, f.correction.acts_on, f.variable, f.gain, f.worth(count), f.held_out, required(limits, count, 2.0 * explained)); }
+        }
         let best_left = left.first();
         if let Some(rival) = rival {
             // Together they may be needed: then both are said.
             let together = explained + best_left.map_or(0.0, |l| l.worth(count).max(0.0));
-            if together - rival.worth(count) < required(limits, count, rival.worth(count)) {
+            let needed = required(limits, count, 3.0 * rival.worth(count));
+            if together - rival.worth(count) < needed {
                 let base = found.base.clone();
                 found.chosen = Candidate { ..base };
                 unexplained.push(rival.clone());
