@@ -39,7 +39,7 @@ pub struct Ablation {
 
 impl Ablation {
     /// Parts that the engine can do without as it stands; the others are refused rather than ignored.
-    pub const HONOURED: &[Part] = &[Part::Remainder];
+    pub const HONOURED: &[Part] = &Part::ALL;
 
     /// The same without one more part; `None` where the engine cannot do without it.
     #[must_use]

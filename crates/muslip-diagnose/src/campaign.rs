@@ -57,6 +57,37 @@ impl Run {
         self.time_s.len()
     }
 
+    /// The run with means over so many samples each; what is missing or no number is left out of them.
+    #[must_use]
+    pub fn averaged(&self, samples: usize) -> Self {
+        if samples <= 1 {
+            return self.clone();
+        }
+        let mean = |x: &Vec<f64>| -> Vec<f64> {
+            x.chunks_exact(samples)
+                .map(|c| {
+                    let usable = || c.iter().filter(|v| v.abs() < 1e15);
+                    usable().sum::<f64>() / usable().count() as f64
+                })
+                .collect()
+        };
+        Self {
+            name: self.name.clone(),
+            time_s: mean(&self.time_s),
+            wheel_speed_rad_s: mean(&self.wheel_speed_rad_s),
+            vehicle_speed_m_s: mean(&self.vehicle_speed_m_s),
+            drag_force_n: mean(&self.drag_force_n),
+            normal_force_n: mean(&self.normal_force_n),
+            brake_torque_nm: self.brake_torque_nm.as_ref().map(mean),
+            brake_pressure_pa: self.brake_pressure_pa.as_ref().map(mean),
+            extra: self
+                .extra
+                .iter()
+                .map(|(name, x)| (name.clone(), mean(x)))
+                .collect(),
+        }
+    }
+
     /// Whether the run has no samples.
     #[must_use]
     pub fn is_empty(&self) -> bool {

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use rayon::prelude::*;
 
+use crate::ablation::Ablation;
 use crate::campaign::{Rig, Run};
 use crate::mechanism::{Before, Context, Mechanism, catalogue};
 use crate::number::{Dual, Number};
@@ -82,6 +83,8 @@ pub struct Data {
     pub extra_names: Vec<String>,
     /// What was wrong with the recordings.
     pub faults: Vec<DataFault>,
+    /// Samples that were averaged into one beforehand, at least one.
+    pub averaged: usize,
     /// All mechanisms.
     pub catalogue: Arc<Catalogue>,
 }
@@ -116,7 +119,7 @@ fn mean(values: impl Iterator<Item = f64>, fallback: f64) -> f64 {
 impl Data {
     /// Prepares all runs of a campaign.
     #[must_use]
-    pub fn new(rig: &Rig, runs: &[Run]) -> Self {
+    pub fn new(rig: &Rig, runs: &[Run], ablation: Ablation) -> Self {
         let mut extra_names: Vec<String> = Vec::new();
         for run in runs {
             for (column, _) in &run.extra {
@@ -125,12 +128,18 @@ impl Data {
                 }
             }
         }
+        if ablation.prefilter {
+            return Self::prepared(rig, runs, &extra_names, 0.0);
+        }
         let mut reach_factor = 1.0;
         loop {
             let data = Self::prepared(rig, runs, &extra_names, reach_factor);
             // Noise that is left in the slip looks like physics: where it is a good part of the residual, wider
             // windows cost less than they save.
-            if reach_factor >= MOST_REACH || data.slip_noise_share() <= SLIP_NOISE_SHARE {
+            if ablation.errors_in_variables
+                || reach_factor >= MOST_REACH
+                || data.slip_noise_share() <= SLIP_NOISE_SHARE
+            {
                 return data;
             }
             reach_factor *= 2.0;
@@ -154,6 +163,7 @@ impl Data {
             context,
             extra_names: extra_names.to_vec(),
             faults: faults.concat(),
+            averaged: 1,
             catalogue: Arc::default(),
         }
     }

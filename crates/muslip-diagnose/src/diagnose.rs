@@ -28,6 +28,10 @@ use crate::tyre_stage::{self, TyreStage};
 /// Called with the share of the work done (0..=1) and what is being done.
 pub type Progress<'a> = &'a (dyn Fn(f64, &str) + Sync);
 
+/// Samples above which neighbours are averaged first: memory and time would grow without telling more of anything
+/// but the fastest effects.
+const MOST_SAMPLES: usize = 400_000;
+
 /// Diagnoses a campaign of recordings. Deterministic: the same input gives the same result, whatever
 /// the number of threads.
 #[must_use]
@@ -44,7 +48,17 @@ pub fn diagnose_without(
     progress: Progress<'_>,
 ) -> Diagnosis {
     progress(0.0, "cleaning and smoothing the recordings");
-    let data = Data::new(rig, runs);
+    let total: usize = runs.iter().map(Run::len).sum();
+    let averaged = total.div_ceil(MOST_SAMPLES).max(1);
+    let means: Vec<Run>;
+    let runs = if averaged > 1 {
+        means = runs.iter().map(|run| run.averaged(averaged)).collect();
+        &means
+    } else {
+        runs
+    };
+    let mut data = Data::new(rig, runs, ablation);
+    data.averaged = averaged;
     let split = Split::new(&data);
     let limits = Limits {
         ablation,
@@ -219,7 +233,7 @@ impl Outcome<'_> {
             .iter()
             .map(|s| Recording {
                 path: s.name.clone(),
-                samples: s.len(),
+                samples: s.len() * self.data.averaged,
                 role: if !self.split.by_block && self.split.proof_runs.contains(&s.index) {
                     Role::Holdout
                 } else {
@@ -313,9 +327,8 @@ impl Outcome<'_> {
             .tyre
             .map_or_else(Vec::new, |stage| Self::unexplained_tyre(stage));
         if let Some(stage) = self.dynamics {
-            let explained = (stage.search.base.fitted.loss
-                - stage.search.chosen.fitted.loss)
-                .max(0.0);
+            let explained =
+                (stage.search.base.fitted.loss - stage.search.chosen.fitted.loss).max(0.0);
             all.extend(stage.unexplained.iter().map(|r| Unexplained {
                 balance: r.balance.as_str(),
                 variable: r.word.clone(),
@@ -529,7 +542,11 @@ impl Outcome<'_> {
                     let before = part.residual(&Model::default(), &[] as &[f64], run);
                     let mut change: Vec<f64> =
                         before.iter().zip(after).map(|(b, a)| a - b).collect();
-                    for r in stage.unexplained.iter().filter(|r| r.balance == part.balance) {
+                    for r in stage
+                        .unexplained
+                        .iter()
+                        .filter(|r| r.balance == part.balance)
+                    {
                         for (c, e) in change.iter_mut().zip(&r.effect[run]) {
                             *c -= e;
                         }
@@ -743,6 +760,12 @@ impl Outcome<'_> {
         if self.data.series.iter().all(|s| s.torque.is_none()) {
             caveats.push("No brake column: the wheel balance could not be formed.".to_owned());
         }
+        if self.data.averaged > 1 {
+            caveats.push(format!(
+                "The recordings are long: means over {} samples were diagnosed, so delays and ringing faster than that could not be seen.",
+                self.data.averaged
+            ));
+        }
         if self.split.by_block {
             caveats.push(
                 "Fewer than four recordings: the proof is by blocks of the same runs.".to_owned(),
@@ -882,7 +905,7 @@ impl Outcome<'_> {
                 .map(|s| KnownRecording {
                     path: s.name.clone(),
                     first_time_s: finite(s.time.first().copied().unwrap_or(0.0)),
-                    samples: s.len(),
+                    samples: s.len() * data.averaged,
                 })
                 .collect(),
         }

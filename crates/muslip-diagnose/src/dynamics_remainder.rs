@@ -92,7 +92,11 @@ fn of_balance(part: &Problem<'_>, model: &Model, limits: &Limits) -> Vec<Dynamic
             let effect = summed(&columns, &fit);
             let price = 0.5 * fit.rank as f64 * (count.max(2) as f64).ln() + LOOKED;
             // The phase of a run left out is unknown: there the price stands for the proof.
-            let held_out = if variable.is_some() { fit.held_out } else { fit.gain - price };
+            let held_out = if variable.is_some() {
+                fit.held_out
+            } else {
+                fit.gain - price
+            };
             let worth = (fit.gain - price).min(held_out);
             let large = size(part, &effect) >= LEAST_EFFECT * sigma;
             (worth.is_finite() && large && worth >= required(limits, count, 0.0)).then(|| {

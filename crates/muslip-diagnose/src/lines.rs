@@ -162,4 +162,3 @@ pub fn strongest(
         significant: total[best] * (runs - 0.33) > most * median,
     })
 }
-

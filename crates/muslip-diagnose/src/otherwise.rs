@@ -79,9 +79,6 @@ impl<'a> Otherwise<'a> {
                         (fewer.loss - with.loss) / gain.max(1e-9)
                     })
                     .fold(f64::INFINITY, f64::min);
-                if std::env::var_os("V").is_some() {
-                    eprintln!("OTHER {:?} gain {gain:.0} least {least:.2}", joint.data().catalogue.get(full.model.terms[place].entry).id());
-                }
                 if least < LEFT && worst.as_ref().is_none_or(|w| least < w.0) {
                     worst = Some((least, without));
                 }
@@ -114,9 +111,6 @@ impl<'a> Otherwise<'a> {
             let gain = group(problem, &levers, variable, action, resolution(variable))
                 .and_then(|g| spline(problem, &regression, variable, &g))
                 .map_or(0.0, |r| r.gain);
-            if std::env::var_os("V").is_some() {
-                eprintln!("OTHER {} gain {:.0} now {gain:.0}", remainder.word, remainder.gain);
-            }
             gain >= LEFT * remainder.gain
         })
     }

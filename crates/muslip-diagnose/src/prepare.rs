@@ -19,6 +19,8 @@ const ABSURD: f64 = 1e15;
 const BRIDGE: usize = 4;
 /// Longest half-window of the smoother in s.
 const MAX_REACH_S: f64 = 0.04;
+/// Shortest half-window of the smoother in samples: a derivative needs neighbours.
+const LEAST_REACH: f64 = 1.2;
 /// Largest factor by which the windows are widened where slip is noisy.
 pub const MOST_REACH: f64 = 4.0;
 
@@ -460,10 +462,12 @@ pub fn prepare(
     let reach: Vec<f64> = (0..n)
         .map(|k| {
             let revolution = core::f64::consts::TAU / omega[k].abs().max(1.0);
-            reach_factor * MAX_REACH_S.min(revolution / 6.0).max(2.2 * typical_dt)
+            let reach = MAX_REACH_S.min(revolution / 6.0).max(2.2 * typical_dt);
+            (reach_factor * reach).max(LEAST_REACH * typical_dt)
         })
         .collect();
-    let slow_reach: Vec<f64> = vec![reach_factor * (2.0 * MAX_REACH_S).max(4.2 * typical_dt); n];
+    let slow = (2.0 * MAX_REACH_S).max(4.2 * typical_dt);
+    let slow_reach: Vec<f64> = vec![(reach_factor * slow).max(LEAST_REACH * typical_dt); n];
     let wheel = channel(time, omega, &continuous, omega_sigma, &reach);
     let speed = channel(time, v, &continuous, v_sigma, &slow_reach);
     let load = channel(time, load, &continuous, load_sigma, &reach);

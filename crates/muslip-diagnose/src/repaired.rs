@@ -295,6 +295,7 @@ impl Repaired {
             context: self.context.clone(),
             extra_names,
             faults: Vec::new(),
+            averaged: 1,
             catalogue: Arc::default(),
         };
         let model = self.tyre_model(&data.catalogue, which)?;

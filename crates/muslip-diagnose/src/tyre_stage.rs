@@ -1,15 +1,16 @@
 //! The tyre balance: base fit, noise, mechanisms, and what they leave.
 
-use crate::choose::{Candidate, Limits, Search, refine, required, search};
 use crate::campaign::Run;
+use crate::choose::{Candidate, Limits, Search, refine, required, search};
 use crate::data::Data;
 use crate::dynamics_stage::CrossEvidence;
 use crate::fit::{BalanceNoise, Fitted, Joint, Problem};
 use crate::mechanism::{Balance, Stage};
 use crate::model::{Model, TYRE_BASE, tyre};
+use crate::noise::loss;
 use crate::omnibus::Levers;
 use crate::otherwise::Otherwise;
-use crate::remainder::{Remainder, candidates, counterparts};
+use crate::remainder::{Remainder, applied, candidates, counterparts};
 use crate::saturated::{self, Slow};
 use crate::split::Split;
 use crate::validation::validated;
@@ -40,6 +41,9 @@ const RECORDED_SHARE: f64 = 1.0;
 const COUNTERPART_SHARE: f64 = 0.7;
 /// Fraction of the strongest dependence that one on a recorded column must reach to be preferred to it.
 const RECORDED_PREFERENCE: f64 = 0.75;
+
+/// Worth in nats from which what the form of a named mechanism leaves is corrected, though not claimed.
+const LEAST_CORRECTION: f64 = 25.0;
 
 /// The dependence that mechanisms have to compete with.
 fn strongest_rival(free: &[Remainder], count: usize) -> Option<&Remainder> {
@@ -165,7 +169,9 @@ pub fn analyse(
     let joint = joint_under(data, split, &noise);
     found = validated(&joint, found, limits);
     let mut otherwise = Otherwise::new(data, runs, split, &noise);
-    found = otherwise.kept(&joint, found);
+    if !limits.ablation.errors_in_variables {
+        found = otherwise.kept(&joint, found);
+    }
     progress(0.65, "looking at what is left");
     Some(remainders(
         &joint,
@@ -207,19 +213,17 @@ fn remainders(
     let mut unexplained: Vec<Remainder> = Vec::new();
     let mut corrections: Vec<Remainder> = Vec::new();
     if found.chosen.ids.is_empty() {
-        if std::env::var_os("V").is_some() {
-            for f in left.iter().take(5) { eprintln!("LEFT {} {} {:?} gain {:.0} worth {:.0} held {:.0} needed {:.0}", f.word, f.correction.acts_on, f.variable, f.gain, f.worth(count), f.held_out, required(limits, count, 0.0)); }
-        }
         if let Some(top) = left.first()
             && top.worth(count) >= required(limits, count, 0.0)
-            && otherwise.holds(joint, &found.base.fitted.model, top)
+            && (limits.ablation.errors_in_variables
+                || otherwise.holds(joint, &found.base.fitted.model, top))
         {
             unexplained.push(top.clone());
             corrections.push(top.clone());
         }
     } else {
         // Does one free dependence account for more than the mechanisms do?
-        let free = candidates(problem, &found.base.fitted.model);
+        let free = dependences(&found.base.fitted.model);
         let rival = strongest_rival(&free, count).filter(|top| {
             let counterpart = counterparts(&top.word)
                 .iter()
@@ -232,10 +236,6 @@ fn remainders(
             };
             top.worth(count) * share > explained
         });
-        if std::env::var_os("V").is_some() {
-            for f in free.iter().take(5) { eprintln!("FREE {} {} {:?} gain {:.0} worth {:.0} held {:.0} | explained {:.0} by {:?}", f.word, f.correction.acts_on, f.variable, f.gain, f.worth(count), f.held_out, explained, found.chosen.ids); }
-            for f in left.iter().take(5) { eprintln!("LEFT {} {} {:?} gain {:.0} worth {:.0} held {:.0} needed {:.0}", f.word, f.correction.acts_on, f.variable, f.gain, f.worth(count), f.held_out, required(limits, count, 2.0 * explained)); }
-        }
         let best_left = left.first();
         if let Some(rival) = rival {
             // Together they may be needed: then both are said.
@@ -250,29 +250,32 @@ fn remainders(
         }
         if unexplained.is_empty()
             && let Some(top) = best_left
+            && top.worth(count) > LEAST_CORRECTION
+            && (limits.ablation.errors_in_variables
+                || otherwise.holds(joint, &found.chosen.fitted.model, top))
         {
             if top.worth(count) >= required(limits, count, 2.0 * explained) {
                 unexplained.push(top.clone());
                 corrections.push(top.clone());
-            } else if top.worth(count) > 25.0 && top.variable.is_some() {
+            } else if top.variable.is_some() {
                 corrections.push(top.clone());
             }
         }
     }
-    // The model's own parameters step along with the correction that they were regressed with.
     let fitted = found.chosen.fitted.clone();
-    let mut model = fitted.model.clone();
-    if let Some(first) = corrections.first() {
-        let bounds = joint.bounds(&model);
-        let moved: Vec<f64> = model
-            .vector()
-            .iter()
-            .zip(&first.own)
-            .zip(&bounds)
-            .map(|((x, d), (low, high))| (x + d).clamp(*low, *high))
-            .collect();
-        model = model.with(&moved);
-    }
+    let model = match corrections.first() {
+        Some(first) => match corrected(joint, &fitted, first) {
+            Some((model, amended)) => {
+                corrections[0] = amended;
+                model
+            }
+            None => {
+                corrections.clear();
+                fitted.model.clone()
+            }
+        },
+        None => fitted.model.clone(),
+    };
     TyreStage {
         noise,
         search: found,
@@ -282,6 +285,64 @@ fn remainders(
         corrections,
         count,
     }
+}
+
+/// Shares of the correction and of the step that goes with it that are tried, largest first.
+const STEPS: [f64; 3] = [1.0, 0.6, 0.3];
+/// Share of the promised gain that the corrected model must keep.
+const KEPT_PROMISE: f64 = 0.33;
+
+/// The model's own parameters step along with the correction that they were regressed with, as far as the
+/// linearisation holds; `None` where it does not.
+fn corrected(
+    joint: &Joint<'_>,
+    fitted: &Fitted,
+    remainder: &Remainder,
+) -> Option<(Model, Remainder)> {
+    let problem = &joint.parts[0];
+    let bounds = joint.bounds(&fitted.model);
+    let before: f64 = problem.losses(&fitted.model).iter().sum();
+    STEPS
+        .iter()
+        .map(|share| {
+            let moved: Vec<f64> = fitted
+                .model
+                .vector()
+                .iter()
+                .zip(&remainder.own)
+                .zip(&bounds)
+                .map(|((x, d), (low, high))| (x + share * d).clamp(*low, *high))
+                .collect();
+            let model = fitted.model.with(&moved);
+            let mut amended = remainder.clone();
+            for value in &mut amended.correction.values {
+                *value *= share;
+            }
+            let levers = Levers::new(problem.data, &model);
+            let added = applied(problem.data, &levers, &amended);
+            let after: f64 = problem
+                .runs
+                .iter()
+                .map(|&run| {
+                    let mut residual = problem.residual(&model, &moved, run);
+                    for (r, a) in residual.iter_mut().zip(&added[run]) {
+                        *r -= a;
+                    }
+                    problem
+                        .whiten(&residual, run)
+                        .iter()
+                        .map(|e| loss(*e))
+                        .sum::<f64>()
+                })
+                .sum();
+            (before - after, model, amended)
+        })
+        .max_by(|a, b| a.0.total_cmp(&b.0))
+        .filter(|(gain, ..)| {
+            // A periodic dependence carries nothing over to other runs.
+            remainder.variable.is_none() || *gain >= KEPT_PROMISE * remainder.gain
+        })
+        .map(|(_, model, amended)| (model, amended))
 }
 
 impl TyreStage {
