@@ -216,7 +216,8 @@ impl Controller {
             // Zeros that cannot be stored still hold until the next reset.
             self.identity.stored = actuators.store(&self.parameters).is_ok();
         }
-        for (tick, event) in core::mem::take(&mut self.events) {
+        // By reference: the queue's own iterator has an index that may panic.
+        for &(tick, event) in &core::mem::take(&mut self.events) {
             self.link
                 .send(Telemetry::Event { tick, event }, Urgency::Prompt, wire);
         }
