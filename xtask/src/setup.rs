@@ -23,8 +23,12 @@ struct Tool {
     needed_for: &'static str,
 }
 
-/// Programs that the tests call. None so far: the toolchain is enough.
-const TOOLS: &[Tool] = &[];
+/// Programs that the tests call.
+const TOOLS: &[Tool] = &[Tool {
+    program: "qemu-system-arm",
+    package: "qemu-system-arm",
+    needed_for: "the firmware's runs",
+}];
 
 /// Installs what is missing, or says exactly what to install.
 pub fn run_all() -> Result<()> {

@@ -5,6 +5,7 @@ use std::process::{Command, Stdio};
 
 use anyhow::{Context, Result, bail};
 
+use crate::firmware;
 use crate::setup::{self, TARGETS};
 use crate::step::{cargo, run, step};
 use crate::trial;
@@ -83,6 +84,8 @@ pub fn run_all() -> Result<()> {
             )?;
         }
     }
+
+    firmware::test()?;
 
     let passed = workspace.passed + long.passed + features.passed;
     let failed = workspace.failed + long.failed + features.failed;

@@ -108,11 +108,9 @@ impl ReadNorFlash for ParameterFlash {
 
     fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), FlashFailed> {
         inside(offset, bytes.len())?;
-        let mut from = START + offset;
-        for byte in bytes {
+        for (byte, from) in bytes.iter_mut().zip(START + offset..) {
             // SAFETY: within the two sectors, which are flash that no Rust object lives in.
             *byte = unsafe { ptr::read_volatile(from as *const u8) };
-            from += 1;
         }
         Ok(())
     }
@@ -146,12 +144,11 @@ impl NorFlash for ParameterFlash {
         }
         self.unlocked(|flash| {
             flash.control(PROGRAM | WORDS);
-            let mut to = START + offset;
-            for word in bytes.as_chunks::<4>().0 {
+            let words = bytes.as_chunks::<4>().0;
+            for (word, to) in words.iter().zip((START + offset..).step_by(4)) {
                 // SAFETY: as in `read`; aligned, by the check above.
                 unsafe { ptr::write_volatile(to as *mut u32, u32::from_le_bytes(*word)) };
                 flash.idle()?;
-                to += 4;
             }
             Ok(())
         })

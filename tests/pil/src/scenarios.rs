@@ -1,4 +1,8 @@
-//! What the image must do, one scenario each.
+//! What the image must do, one scenario each; an error says what is not as it must be.
+#![expect(
+    clippy::missing_errors_doc,
+    reason = "every scenario's error is its finding"
+)]
 
 use std::path::Path;
 
@@ -47,9 +51,6 @@ fn found(bench: &Bench, line: String) -> Found {
 }
 
 /// Hello, answers, a status, a foreign profile refused.
-///
-/// # Errors
-/// What is not as it must be, here and below.
 pub fn greets(image: &Path) -> Result<Found> {
     let mut bench = Bench::start(image, LAW, 1)?;
     bench.run(20)?;
@@ -440,17 +441,18 @@ pub fn free_run(image: &Path) -> Result<Found> {
     );
     let error_ns = i64::from(elapsed_ns) - 300_000_000;
     ensure!(error_ns.abs() < 100_000, "{elapsed_ns} ns");
-    // Work of a sample and a half: every other sample comes too late.
+    // The emulator's timer takes an instruction for a nanosecond: 1.5 million are a sample and a half. At
+    // least every other sample then comes too late.
     let FromFirmware::FreeRun {
         late: missed,
         output,
         ..
-    } = bench.qemu.free_run(&raw, 100, 3 * 500_000)?
+    } = bench.qemu.free_run(&raw, 100, 1_500_000)?
     else {
         bail!("no free run");
     };
     ensure!(
-        missed >= 33 && output == BrakeOutput::DUMPED,
+        missed >= 50 && output == BrakeOutput::DUMPED,
         "{missed} {output:?}"
     );
     Ok(found(
