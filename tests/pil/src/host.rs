@@ -3,7 +3,7 @@
 use anyhow::Result;
 use muslip_record::{
     Answer, Command, Envelope, Estimate, Event, FRAME_BYTES, FrameError, FrameReader, Hello,
-    Sample, Status, Telemetry, encode,
+    QuarterCar, Sample, Status, Telemetry, encode,
 };
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -40,6 +40,8 @@ pub struct Heard {
     pub status: Option<Status>,
     /// The newest estimate.
     pub estimate: Option<Estimate>,
+    /// The newest estimate of the quarter-car filter.
+    pub quarter_car: Option<QuarterCar>,
     /// The newest sample.
     pub sample: Option<Sample>,
     /// Samples, in all.
@@ -171,6 +173,7 @@ impl Host {
             Telemetry::Estimate(estimate) => heard.estimate = Some(estimate),
             Telemetry::Event { tick, event } => heard.events.push((tick, event)),
             Telemetry::Status(status) => heard.status = Some(status),
+            Telemetry::QuarterCar(estimate) => heard.quarter_car = Some(estimate),
             Telemetry::Parameters(_) => {}
         }
     }

@@ -36,6 +36,7 @@ fn main() -> Result<()> {
         ("greets", Box::new(|| scenarios::greets(image))),
         ("ramps", Box::new(|| scenarios::ramps(image))),
         ("steps", Box::new(|| scenarios::steps(image))),
+        ("slip hold", Box::new(|| scenarios::slip_hold(image))),
         ("interlocks", Box::new(|| scenarios::interlocks(image))),
         ("corruption", Box::new(|| scenarios::corruption(image))),
         (

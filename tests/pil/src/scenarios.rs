@@ -160,6 +160,63 @@ pub fn steps(image: &Path) -> Result<Found> {
     Ok(found(&bench, format!("{} levels held", held.len())))
 }
 
+/// Slip held below and near the peak: it converges, stays, and the wheel does not skid.
+pub fn slip_hold(image: &Path) -> Result<Found> {
+    let mut lines = Vec::new();
+    let mut worst = Worst::default();
+    for target_slip in [0.05, 0.1] {
+        let mut bench = Bench::start(image, LAW, 10)?;
+        bench.begin(Profile {
+            program: Program::SlipHold {
+                target_slip,
+                hold_s: 2.0,
+            },
+            applications: 1,
+            ..RAMP
+        })?;
+        bench.until(State::Ramp, 1_000)?;
+        let mut slips = Vec::new();
+        while bench.state() == State::Ramp {
+            bench.sample()?;
+            slips.push(bench.rig.slip_ratio());
+        }
+        ensure!(bench.state() == State::Release, "{:?}", bench.state());
+        ensure!(slips.len() > 1_900, "{} samples", slips.len());
+        let target = f64::from(target_slip);
+        let settled = slips
+            .iter()
+            .rposition(|slip| (slip / target - 1.0).abs() > 0.2);
+        let last = slips.iter().rev().skip(50).take(1_000);
+        let (count, sum, largest) = last.fold((0.0, 0.0, 0.0_f64), |(n, sum, largest), slip| {
+            (n + 1.0, sum + slip, largest.max((slip - target).abs()))
+        });
+        let mean = sum / count;
+        let settled = settled.unwrap_or(0);
+        ensure!(
+            settled < 1_000,
+            "slip {target} is only within 20 % from {settled} ms on"
+        );
+        ensure!(
+            (mean / target - 1.0).abs() < 0.05,
+            "mean {mean} for {target}"
+        );
+        let Some(estimate) = bench.host.heard.quarter_car else {
+            bail!("no estimate of the quarter car");
+        };
+        let [_, speed, _, _, mass] = estimate.state;
+        ensure!(
+            (speed - 20.0).abs() < 0.1 && (mass - 420.0).abs() < 10.0,
+            "{estimate:?}"
+        );
+        lines.push(format!("{target_slip}: within 20 % after {settled} ms, then mean {mean:.4}, at most {largest:.4} off"));
+        worst = most(worst, bench.worst);
+    }
+    Ok(Found {
+        line: lines.join("; "),
+        worst,
+    })
+}
+
 /// One fault injected while the brake is at work.
 struct Injection {
     fault: Fault,
