@@ -120,17 +120,6 @@ fn bad_usage_is_one_line_and_status_2() {
         ),
         (&["fit", "--rig", "rig.toml"], "<RUN.csv>"),
         (&["completions", "tcsh"], "tcsh"),
-        (
-            &[
-                "estimate",
-                "--rig",
-                "rig.toml",
-                "--estimator",
-                "efficient",
-                "run.csv",
-            ],
-            "error: --estimator efficient is not part of this version",
-        ),
     ] {
         let complaint = scratch.complaint(arguments);
         assert!(complaint.contains(part), "{complaint}");

@@ -5,6 +5,7 @@
 //! filter whose measurement is another (forces and speeds of a quarter car, with a time step) states it
 //! as its [`Estimator::Measurement`].
 
+pub mod efficient;
 pub mod mu_slip;
 pub mod quarter_car;
 
