@@ -299,6 +299,9 @@ fn bound(truth: Curve, slips: &[f64]) -> [f64; 2] {
     ]
 }
 
+/// Runs one estimator over one stream.
+type Contender<'a> = dyn Fn(Curve, &Stream) -> Outcome + Sync + 'a;
+
 /// Sums over streams.
 struct Summary {
     rmse: [f64; 2],
@@ -356,7 +359,7 @@ fn run<const N: usize>(
     slips: &[f64],
     disturbance: Disturbance,
     seeds: u64,
-    contenders: [&(dyn Fn(Curve, &Stream) -> Outcome + Sync); N],
+    contenders: [&Contender<'_>; N],
 ) -> (Summary, [Summary; N]) {
     let outcomes: Vec<(Outcome, [Outcome; N])> = (0..seeds)
         .into_par_iter()

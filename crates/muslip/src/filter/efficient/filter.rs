@@ -36,7 +36,7 @@ const CONVICTED: f64 = 10.0;
 /// Most measurements in a row that the gate rejects.
 const MOST_REJECTIONS: f64 = 3.0;
 /// Curvature in ln sp over the noise from which sp at an end of its range is believed to lie beyond.
-const BEYOND: f64 = 25.0;
+const BEYOND: f64 = 100.0;
 /// Samples in a row after which the sums start anew about that end.
 const BEYOND_SAMPLES: f64 = 16.0;
 /// Samples at which all sums are halved.
