@@ -1,4 +1,9 @@
 //! The efficient estimator against batch maximum likelihood, written a second time here, and its edges.
+#![allow(
+    clippy::unwrap_used,
+    clippy::panic,
+    reason = "a failed step fails the test"
+)]
 
 use muslip::filter::efficient::{Config, ConfigError, ConfigParameter, EfficientFilter};
 use muslip::filter::mu_slip::{Decision, Range, UpdateError};
