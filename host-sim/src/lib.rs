@@ -10,6 +10,7 @@ pub mod input_error;
 pub mod measure;
 pub mod output;
 pub mod paper;
+pub mod quarter_car;
 pub mod recording;
 pub mod report;
 pub mod rig_file;

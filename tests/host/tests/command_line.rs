@@ -8,13 +8,14 @@ use std::time::{Duration, Instant};
 use common::{HEADER, RIG, Scratch, recording_of};
 use test_support::scenario::article;
 
-const SUBCOMMANDS: [&str; 8] = [
+const SUBCOMMANDS: [&str; 9] = [
     "estimate",
     "fit",
     "diagnose",
     "predict",
     "simulate",
     "paper",
+    "quarter-car",
     "demo",
     "completions",
 ];

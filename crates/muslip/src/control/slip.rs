@@ -284,6 +284,14 @@ impl<T: Real> SlipController<T> {
         })
     }
 
+    /// Lowers the torque as fast as the rate allows for one sample and empties the integral: for a guard
+    /// that overrules slip. Called instead of [`SlipController::step`].
+    pub fn release(&mut self) {
+        let reach = self.config.maximum_torque_rate_nm_s * self.config.sample_time_s;
+        self.brake_torque_nm = (self.brake_torque_nm - reach).max(T::ZERO);
+        self.integral_nm = T::ZERO;
+    }
+
     fn within_range(&self, torque_nm: T) -> T {
         torque_nm.min(self.config.maximum_torque_nm).max(T::ZERO)
     }

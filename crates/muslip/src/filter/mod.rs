@@ -8,6 +8,7 @@
 pub mod efficient;
 pub mod mu_slip;
 pub mod quarter_car;
+pub mod road_bank;
 
 use crate::real::Real;
 

@@ -244,6 +244,11 @@ impl<T: Real> QuarterCarFilter<T> {
         }
     }
 
+    /// The same filter at another estimate, unchecked: for mixtures of estimates that were checked.
+    pub(crate) fn at(&self, estimate: Estimate<T>) -> Self {
+        Self { estimate, ..*self }
+    }
+
     /// The 5×5 Jacobian F of the model at a state and a brake torque in N m, order ω, v, λ, μ, m; for
     /// analysis. [`predict`](Self::predict) never forms it.
     pub fn transition_jacobian(&self, state: &State<T>, brake_torque_nm: T) -> SMatrix<T, 5, 5> {
