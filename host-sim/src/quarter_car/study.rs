@@ -242,7 +242,7 @@ pub fn study(options: StudyOptions, progress: &mut dyn FnMut(u64)) -> Result<Stu
     let references: Vec<Reference> = Road::all().par_iter().map(reference).collect();
     tell(4);
     let mut comparison = Vec::new();
-    for road in Road::all() {
+    for (road, reference) in Road::all().into_iter().zip(&references) {
         for who in [
             Who::Perfect,
             Who::Tutorial,
@@ -253,7 +253,8 @@ pub fn study(options: StudyOptions, progress: &mut dyn FnMut(u64)) -> Result<Stu
             Who::Bank,
         ] {
             let bar = who.bar(&road);
-            comparison.push(row(who, &road, options, "", bar, &|_| {})?);
+            let scenario = Scenario::usual(road.clone(), options.seed);
+            comparison.push(row(who, &scenario, reference.optimum_m, options, "", bar)?);
             tell(1);
         }
     }
@@ -267,8 +268,14 @@ pub fn study(options: StudyOptions, progress: &mut dyn FnMut(u64)) -> Result<Stu
         ("dead time 5 ms", &|s| s.actuator.dead_samples = 1),
     ] {
         for road in Road::all() {
+            let mut scenario = Scenario::usual(road.clone(), options.seed);
+            change(&mut scenario);
+            // Dead time is no limit to one who knows everything beforehand.
+            let mut prompt = scenario.clone();
+            prompt.actuator.dead_samples = 0;
+            let best = optimum(&prompt).distance_m;
             for who in [Who::Tuned, Who::RigSought, Who::Bank] {
-                variants.push(row(who, &road, options, variant, who.bar(&road), change)?);
+                variants.push(row(who, &scenario, best, options, variant, who.bar(&road))?);
             }
         }
         tell(4);
@@ -326,27 +333,15 @@ fn reference(road: &Road) -> Reference {
     }
 }
 
-/// Stops that differ in their noise alone, against one optimum.
+/// Stops that differ in their noise alone, against one optimum in m.
 fn row(
     who: Who,
-    road: &Road,
+    like: &Scenario,
+    best: f64,
     options: StudyOptions,
     variant: &str,
     bar: Option<f64>,
-    change: &(dyn Fn(&mut Scenario) + Sync),
 ) -> Result<Row, SetupError> {
-    let mut changed = Scenario::usual(road.clone(), options.seed);
-    change(&mut changed);
-    // Dead time is no limit to one who knows everything beforehand.
-    let best = optimum(&Scenario {
-        fault: None,
-        actuator: super::scenario::Actuator {
-            dead_samples: 0,
-            ..changed.actuator
-        },
-        ..changed.clone()
-    })
-    .distance_m;
     // Without noise in what they are told, one stop is all stops.
     let stops = match who {
         Who::Perfect | Who::Locked => 1,
@@ -357,7 +352,7 @@ fn row(
         .map(|index| {
             let scenario = Scenario {
                 seed: options.seed.wrapping_add(index),
-                ..changed.clone()
+                ..like.clone()
             };
             let stop = stop(&scenario, who.driver(&scenario)?.as_mut());
             Ok((stop.distance_m / best, stop))
@@ -365,7 +360,7 @@ fn row(
         .collect();
     Ok(Row {
         who,
-        road: road.name,
+        road: like.road.name,
         variant: variant.into(),
         ratios: Ratios::of(stops?),
         bar,

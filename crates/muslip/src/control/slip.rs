@@ -9,7 +9,7 @@
 //!
 //! Slip moves as dλ/dt = R/(J v) (T − R F) while speed hardly changes, F being the tyre's force; with the
 //! tyre's torque R F fed forward the loop is dλ/dt = B e at every speed and on both sides of the peak,
-//! B (rad/s) its bandwidth. Equations (34)-(36) of docs/model.md.
+//! B (rad/s) its bandwidth. Equations (37)-(39) of docs/model.md.
 
 use core::fmt;
 

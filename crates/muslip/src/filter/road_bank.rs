@@ -10,7 +10,7 @@
 //! w_j  ∝ c_j exp(−NIS_j/2)/√s_j             after the filter's own prediction and correction
 //! ```
 //!
-//! Equations (37)-(39) of docs/model.md. Wheel speed tells roads apart by the torque that they bear, so the
+//! Equations (34)-(36) of docs/model.md. Wheel speed tells roads apart by the torque that they bear, so the
 //! mass must be known: a light car on a dry road and a heavy one on a wet road lock at the same torque.
 
 use super::mu_slip::Decision;
