@@ -1,6 +1,6 @@
 //! A setpoint for a road that nobody knows, where slip and friction are measured.
 //!
-//! The two-state filter of [`mu_slip`](crate::filter::mu_slip) follows peak friction and critical slip while
+//! The two-state filter of [`mu_slip`] follows peak friction and critical slip while
 //! the brake is at work; a share of its critical slip is the setpoint. It has no process noise, so the
 //! seeker starts it anew when friction no longer fits: when the mean of the last innovations, in standard
 //! deviations, exceeds a threshold, the road is another one.
