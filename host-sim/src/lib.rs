@@ -14,6 +14,7 @@ pub mod quarter_car;
 pub mod recording;
 pub mod report;
 pub mod rig_file;
+pub mod rig_link;
 pub mod simulate;
 pub mod thin;
 pub mod wording;

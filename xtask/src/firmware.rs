@@ -223,6 +223,24 @@ pub fn pil(arguments: &[String], write: bool) -> Result<()> {
     })
 }
 
+/// Builds, checks, and serves the image behind a socket until it is ended.
+pub fn serve(address: &str) -> Result<()> {
+    setup::run_all()?;
+    budgets()?;
+    let mut pil = cargo(&[
+        "run",
+        "--release",
+        "--locked",
+        "--quiet",
+        "--package",
+        "pil",
+        "--",
+    ]);
+    pil.args([image_path("muslip-firmware"), image_path("panic-image")])
+        .args(["--serve", address]);
+    run("simulated rig", pil)
+}
+
 /// What `cargo xtask test` runs of it.
 pub fn test() -> Result<()> {
     pil(&["--seconds".to_owned(), SECONDS_IN_TEST.to_owned()], false)

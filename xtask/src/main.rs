@@ -38,6 +38,9 @@ enum Command {
         /// Write the measured figures into README.md.
         #[arg(long)]
         write: bool,
+        /// Instead of all that: the image behind a socket at this address, for `muslip rig`.
+        #[arg(long, value_name = "HOST:PORT")]
+        serve: Option<String>,
     },
     /// Build, check, and put the image onto a chip by probe-rs.
     Flash,
@@ -60,13 +63,17 @@ fn main() -> anyhow::Result<()> {
             seconds,
             only,
             write,
+            serve,
         } => {
             let mut arguments = vec!["--seconds".to_owned(), seconds.to_string()];
             arguments.extend(
                 only.into_iter()
                     .flat_map(|only| ["--only".to_owned(), only]),
             );
-            firmware::pil(&arguments, write)
+            match serve {
+                Some(address) => firmware::serve(&address),
+                None => firmware::pil(&arguments, write),
+            }
         }
         Command::Flash => firmware::flash(),
         Command::Trial { arguments } => trial::play(&arguments),

@@ -12,6 +12,7 @@ mod paper;
 mod predict;
 mod progress;
 mod quarter_car;
+mod rig;
 mod simulate;
 mod terminal;
 
@@ -50,6 +51,7 @@ enum Command {
     Paper(paper::Arguments),
     QuarterCar(quarter_car::Arguments),
     Demo(demo::Arguments),
+    Rig(rig::Arguments),
     Completions(completions::Arguments),
 }
 
@@ -108,6 +110,7 @@ pub fn main() -> ExitCode {
         Command::Paper(arguments) => paper::run(&arguments, &mut terminal),
         Command::QuarterCar(arguments) => quarter_car::run(&arguments, &mut terminal),
         Command::Demo(arguments) => demo::run(&arguments, &mut terminal),
+        Command::Rig(arguments) => rig::run(&arguments, &mut terminal),
         Command::Completions(arguments) => completions::run(&arguments, &mut terminal),
     };
     match outcome {

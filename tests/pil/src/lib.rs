@@ -14,4 +14,5 @@ pub mod native;
 pub mod qemu;
 pub mod rig;
 pub mod scenarios;
+pub mod serve;
 pub mod target;

@@ -1,12 +1,17 @@
 //! Runs the scenarios on an image and prints what they found.
 #![forbid(unsafe_code)]
 
-use std::path::PathBuf;
+use std::net::TcpListener;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
 use anyhow::{Context, Result, bail};
 use clap::Parser;
+use muslip_record::Parameters;
 use pil::bench::Worst;
+use pil::qemu::Qemu;
+use pil::rig::Rig;
 use pil::scenarios::{self, CYCLES_PER_SAMPLE, Found, WORK_PERCENT, most};
 
 /// Processor in the loop: the firmware's image in QEMU, in lock-step with the rig simulator.
@@ -22,6 +27,9 @@ struct Arguments {
     /// Only scenarios whose name contains this.
     #[arg(long)]
     only: Option<String>,
+    /// Instead of all that: the image behind a socket at this address, in real time, for `muslip rig`.
+    #[arg(long, value_name = "HOST:PORT")]
+    serve: Option<String>,
     /// Where the measured figures go, as lines of `name = value`.
     #[arg(long)]
     figures: Option<PathBuf>,
@@ -32,6 +40,9 @@ type Scenario<'a> = (&'a str, Box<dyn Fn() -> Result<Found> + 'a>);
 fn main() -> Result<()> {
     let arguments = Arguments::parse();
     let (image, panic_image) = (&arguments.image, &arguments.panic_image);
+    if let Some(address) = &arguments.serve {
+        return serve(address, image);
+    }
     let all: Vec<Scenario<'_>> = vec![
         ("greets", Box::new(|| scenarios::greets(image))),
         ("ramps", Box::new(|| scenarios::ramps(image))),
@@ -101,4 +112,16 @@ fn main() -> Result<()> {
         bail!("{failed} failed");
     }
     Ok(())
+}
+
+/// A fresh rig and image for every client, for ever.
+fn serve(address: &str, image: &Path) -> Result<()> {
+    let listener = TcpListener::bind(address).with_context(|| address.to_owned())?;
+    println!("a simulated rig, rolling at 20 m/s: muslip rig --port tcp:{address} status");
+    loop {
+        let (client, _) = listener.accept()?;
+        let (mut qemu, _) = Qemu::start(image)?;
+        let mut rig = Rig::rolling("rudd:0.85,0.14", 20.0, 1, &Parameters::default())?;
+        pil::serve::serve(&mut qemu, &mut rig, client, 1.0, &AtomicBool::new(false))?;
+    }
 }
