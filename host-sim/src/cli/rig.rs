@@ -93,7 +93,7 @@ struct Run {
 
 impl From<RigError> for Failure {
     fn from(error: RigError) -> Self {
-        Self::Usage(format!("error: {}", one_line(&error.to_string())))
+        Self::Usage(one_line(&error.to_string()))
     }
 }
 
@@ -108,7 +108,7 @@ pub(super) fn run(arguments: &Arguments, terminal: &mut Terminal) -> Result<(), 
         _ => None,
     };
     let port = Port::open(&arguments.port)
-        .map_err(|error| Failure::Usage(format!("error: {}", one_line(&error.to_string()))))?;
+        .map_err(|error| Failure::Usage(one_line(&error.to_string())))?;
     let (mut session, hello) = Session::open(port)?;
     match &arguments.action {
         Action::Status => {
@@ -169,7 +169,7 @@ fn profile(run: &Run) -> Result<Profile, Failure> {
         (None, Some(steps), None) => {
             let mut levels = [0.0; STEPS];
             if steps.len() > STEPS {
-                return Err(Failure::Usage(format!("error: more than {STEPS} steps")));
+                return Err(Failure::Usage(format!("more than {STEPS} steps")));
             }
             for (level, &step) in levels.iter_mut().zip(steps) {
                 *level = step;
@@ -186,7 +186,7 @@ fn profile(run: &Run) -> Result<Profile, Failure> {
         },
         _ => {
             return Err(Failure::Usage(
-                "error: one of --ramp, --steps and --slip is needed".to_owned(),
+                "one of --ramp, --steps and --slip is needed".to_owned(),
             ));
         }
     };
@@ -375,7 +375,7 @@ fn record(
     match fault {
         None => Ok(()),
         Some(fault) => Err(Failure::Usage(format!(
-            "error: fault {fault:?}: the brake was dumped; the recording is kept. When the cause is gone: muslip rig clear"
+            "fault {fault:?}: the brake was dumped; the recording is kept. When the cause is gone: muslip rig clear"
         ))),
     }
 }

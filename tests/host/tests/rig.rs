@@ -28,6 +28,7 @@ impl Server {
         let thread = std::thread::spawn(move || {
             let mut target = Native::new().unwrap();
             let mut rig = Rig::rolling("rudd:0.85,0.14", 20.0, 1, &Parameters::default()).unwrap();
+            pil::serve::settle(&mut target, &mut rig).unwrap();
             rig.trouble = trouble;
             // One client after the other on the same controller.
             while let Ok((client, _)) = listener.accept() {
@@ -123,7 +124,7 @@ fn an_interlock_that_stands_is_named_and_nothing_is_recorded() {
         "run.csv",
     ]);
     assert!(
-        told.contains("refuses to arm: interlock EmergencyStop"),
+        told.contains("error: the rig refuses to arm: interlock EmergencyStop"),
         "{told}"
     );
     assert!(!scratch.path("run.csv").exists());
@@ -138,6 +139,6 @@ fn a_port_that_is_not_there_is_one_line() {
         "unix:/no/such/socket",
     ] {
         let told = scratch.complaint(&["rig", "--port", port, "status"]);
-        assert!(told.contains(port.trim_start_matches("tcp:")), "{told}");
+        assert!(told.starts_with(&format!("error: {port}: ")), "{told}");
     }
 }

@@ -114,14 +114,15 @@ fn main() -> Result<()> {
     Ok(())
 }
 
-/// A fresh rig and image for every client, for ever.
+/// One rig and image for all clients, one after the other, for ever; time stands still without one.
 fn serve(address: &str, image: &Path) -> Result<()> {
     let listener = TcpListener::bind(address).with_context(|| address.to_owned())?;
+    let (mut qemu, _) = Qemu::start(image)?;
+    let mut rig = Rig::rolling("rudd:0.85,0.14", 20.0, 1, &Parameters::default())?;
+    pil::serve::settle(&mut qemu, &mut rig)?;
     println!("a simulated rig, rolling at 20 m/s: muslip rig --port tcp:{address} status");
     loop {
         let (client, _) = listener.accept()?;
-        let (mut qemu, _) = Qemu::start(image)?;
-        let mut rig = Rig::rolling("rudd:0.85,0.14", 20.0, 1, &Parameters::default())?;
         pil::serve::serve(&mut qemu, &mut rig, client, 1.0, &AtomicBool::new(false))?;
     }
 }

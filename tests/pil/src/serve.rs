@@ -12,6 +12,22 @@ use crate::bench::WIRE_BYTES;
 use crate::rig::Rig;
 use crate::target::{Input, Target};
 
+/// Lets a rig that is at speed from nothing run until the speed meters have settled.
+///
+/// # Errors
+/// The target is gone.
+pub fn settle(target: &mut impl Target, rig: &mut Rig) -> Result<()> {
+    for _ in 0..100 {
+        target.sample(&Input {
+            raw: rig.sample(BrakeOutput::DUMPED),
+            link: &[],
+            room: WIRE_BYTES,
+            burn: 0,
+        })?;
+    }
+    Ok(())
+}
+
 /// Samples for a client until it leaves or `stop` is set; `speed` is simulated over real time.
 ///
 /// # Errors
