@@ -2,7 +2,9 @@
 #![forbid(unsafe_code)]
 
 mod check;
+mod cycles;
 mod firmware;
+mod pipeline;
 mod setup;
 mod step;
 mod test;
@@ -42,6 +44,12 @@ enum Command {
         #[arg(long, value_name = "HOST:PORT")]
         serve: Option<String>,
     },
+    /// What one update of each filter costs on a Cortex-M4F: instructions in QEMU, modelled cycles.
+    Cycles {
+        /// Print a JSON list and nothing else.
+        #[arg(long)]
+        json: bool,
+    },
     /// Build, check, and put the image onto a chip by probe-rs.
     Flash,
     /// The sealed trial of the diagnosis: conceal effects, diagnose, open, judge, write docs/trials.md.
@@ -75,6 +83,7 @@ fn main() -> anyhow::Result<()> {
                 None => firmware::pil(&arguments, write),
             }
         }
+        Command::Cycles { json } => cycles::run_all(json),
         Command::Flash => firmware::flash(),
         Command::Trial { arguments } => trial::play(&arguments),
     }
