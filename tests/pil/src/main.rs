@@ -46,6 +46,7 @@ fn main() -> Result<()> {
     let all: Vec<Scenario<'_>> = vec![
         ("greets", Box::new(|| scenarios::greets(image))),
         ("ramps", Box::new(|| scenarios::ramps(image))),
+        ("full lock", Box::new(|| scenarios::full_lock(image))),
         ("steps", Box::new(|| scenarios::steps(image))),
         ("slip hold", Box::new(|| scenarios::slip_hold(image))),
         ("interlocks", Box::new(|| scenarios::interlocks(image))),

@@ -125,6 +125,32 @@ pub fn ramps(image: &Path) -> Result<Found> {
     ))
 }
 
+/// The wheel locks, is held for the longest time that a profile may ask for, and rolls again: no interlock takes
+/// that for a fault.
+pub fn full_lock(image: &Path) -> Result<Found> {
+    let mut bench = Bench::start(image, LAW, 11)?;
+    bench.begin(Profile {
+        skid_slip: 0.97,
+        skid_hold_s: 0.15,
+        ..RAMP
+    })?;
+    let mut locked = 0;
+    while bench.state() != State::Done {
+        bench.sample()?;
+        locked += u32::from(bench.rig.slip_ratio() >= 1.0);
+        ensure!(
+            bench.state() != State::Fault && bench.samples < 12_000,
+            "{:?}",
+            bench.host.heard.events
+        );
+    }
+    ensure!((200..400).contains(&locked), "{locked} samples locked");
+    Ok(found(
+        &bench,
+        format!("locked for {locked} ms in two applications, no fault"),
+    ))
+}
+
 /// Stepped holds short of the peak: no skid, every level held.
 pub fn steps(image: &Path) -> Result<Found> {
     let mut bench = Bench::start(image, LAW, 3)?;
