@@ -61,6 +61,9 @@ pub fn consistency_sentence(consistency: &Consistency, estimator: EstimatorKind)
         (Verdict::Conservative, EstimatorKind::Article) => {
             "as always with the article's filter, which takes three times the measurement sigma and adds pseudonoise"
         }
+        (Verdict::Conservative, EstimatorKind::Efficient) => {
+            "measurements lie nearer to the curve than the noise that was learnt, which is held above 0.15 times the declared variance"
+        }
         (Verdict::Overconfident, _) => {
             "measurements lie further from the curve than their noise explains: another curve than the law's, or more noise than stated; do not trust the 1-sigma figures"
         }

@@ -32,6 +32,22 @@ pub fn run_all() -> Result<()> {
             "warnings",
         ]),
     )?;
+    run(
+        "clippy of the firmware's image",
+        cargo(&[
+            "clippy",
+            "--package",
+            "firmware",
+            "--features",
+            "test-image",
+            "--target",
+            "thumbv7em-none-eabihf",
+            "--locked",
+            "--",
+            "-D",
+            "warnings",
+        ]),
+    )?;
     // Libraries only: the command and the core are both called muslip and would overwrite each other.
     let mut documentation = cargo(&["doc", "--workspace", "--lib", "--no-deps", "--locked"]);
     documentation.env("RUSTDOCFLAGS", "-D warnings");

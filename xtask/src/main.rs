@@ -2,6 +2,9 @@
 #![forbid(unsafe_code)]
 
 mod check;
+mod cycles;
+mod firmware;
+mod pipeline;
 mod setup;
 mod step;
 mod test;
@@ -23,6 +26,32 @@ enum Command {
     Test,
     /// Formatting, clippy and documentation, with warnings denied.
     Check,
+    /// Build the firmware's image and check its sizes, and that it cannot panic, has no heap and no double
+    /// precision.
+    Firmware,
+    /// Processor in the loop: the image in QEMU, in lock-step with the rig simulator, against its budgets.
+    Pil {
+        /// Simulated seconds of the endurance run.
+        #[arg(long, default_value_t = 10)]
+        seconds: u32,
+        /// Only scenarios whose name contains this; budgets are then of those alone.
+        #[arg(long)]
+        only: Option<String>,
+        /// Write the measured figures into README.md.
+        #[arg(long)]
+        write: bool,
+        /// Instead of all that: the image behind a socket at this address, for `muslip rig`.
+        #[arg(long, value_name = "HOST:PORT")]
+        serve: Option<String>,
+    },
+    /// What one update of each filter costs on a Cortex-M4F: instructions in QEMU, modelled cycles.
+    Cycles {
+        /// Print a JSON list and nothing else.
+        #[arg(long)]
+        json: bool,
+    },
+    /// Build, check, and put the image onto a chip by probe-rs.
+    Flash,
     /// The sealed trial of the diagnosis: conceal effects, diagnose, open, judge, write docs/trials.md.
     ///
     /// Arguments go to `sealed-trial run`, among them --seed, --small, --scale, --jobs and --out; --help tells all.
@@ -37,6 +66,25 @@ fn main() -> anyhow::Result<()> {
     match Arguments::parse().command {
         Command::Test => test::run_all(),
         Command::Check => check::run_all(),
+        Command::Firmware => firmware::budgets(),
+        Command::Pil {
+            seconds,
+            only,
+            write,
+            serve,
+        } => {
+            let mut arguments = vec!["--seconds".to_owned(), seconds.to_string()];
+            arguments.extend(
+                only.into_iter()
+                    .flat_map(|only| ["--only".to_owned(), only]),
+            );
+            match serve {
+                Some(address) => firmware::serve(&address),
+                None => firmware::pil(&arguments, write),
+            }
+        }
+        Command::Cycles { json } => cycles::run_all(json),
+        Command::Flash => firmware::flash(),
         Command::Trial { arguments } => trial::play(&arguments),
     }
 }

@@ -23,8 +23,32 @@ struct Tool {
     needed_for: &'static str,
 }
 
-/// Programs that the tests call. None so far: the toolchain is enough.
-const TOOLS: &[Tool] = &[];
+/// Programs that the tests call.
+const TOOLS: &[Tool] = &[Tool {
+    program: "qemu-system-arm",
+    package: "qemu-system-arm",
+    needed_for: "the firmware's runs",
+}];
+
+/// Programs that the cycles table calls.
+const CYCLES_TOOLS: &[Tool] = &[
+    Tool {
+        program: "qemu-system-arm",
+        package: "qemu-system-arm",
+        needed_for: "running the candidates",
+    },
+    Tool {
+        program: "arm-none-eabi-objdump",
+        package: "binutils-arm-none-eabi",
+        needed_for: "reading what was executed",
+    },
+];
+
+/// As [`run_all`], for `cargo xtask cycles`.
+pub fn for_cycles() -> Result<()> {
+    targets()?;
+    tools(CYCLES_TOOLS)
+}
 
 /// Installs what is missing, or says exactly what to install.
 pub fn run_all() -> Result<()> {

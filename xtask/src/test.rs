@@ -5,12 +5,13 @@ use std::process::{Command, Stdio};
 
 use anyhow::{Context, Result, bail};
 
+use crate::firmware;
 use crate::setup::{self, TARGETS};
 use crate::step::{cargo, run, step};
 use crate::trial;
 
 /// Packages whose `#[ignore]`d tests are long rather than broken: run in release.
-const LONG_TESTS: &[&str] = &["muslip"];
+const LONG_TESTS: &[&str] = &["muslip", "host-tests"];
 
 /// Feature sets of the core; neither may change whether it builds.
 const CORE_FEATURES: [&str; 4] = ["", "defmt", "serde", "defmt,serde"];
@@ -83,6 +84,8 @@ pub fn run_all() -> Result<()> {
             )?;
         }
     }
+
+    firmware::test()?;
 
     let passed = workspace.passed + long.passed + features.passed;
     let failed = workspace.failed + long.failed + features.failed;

@@ -1,9 +1,10 @@
 //! The controller: interlocks, state machine, estimates and link, put together.
 
 use heapless::Vec;
+use muslip::sample::RigSample;
 use muslip_record::{
-    Answer, Command, Event, Fault, Hello, PROTOCOL_VERSION, Parameters, Program, Refusal,
-    SAMPLE_RATE_HZ, SAMPLES_PER_ESTIMATE, SCHEMA_HASH, Sample, State, Status, Telemetry,
+    Answer, Command, Event, Fault, Hello, PROTOCOL_VERSION, Parameters, Refusal, SAMPLE_RATE_HZ,
+    SAMPLES_PER_ESTIMATE, SCHEMA_HASH, Sample, State, Status, Telemetry,
 };
 
 use crate::board::{Actuators, BridgeQuality, NotStored, RawSample};
@@ -13,6 +14,7 @@ use crate::estimation::Estimation;
 use crate::interlock::{Circumstances, FaultSet, Interlocks};
 use crate::link::{Arrival, Link, Transmit, Urgency};
 use crate::sequence::{Observed, Sequence};
+use crate::slip_hold::{Refused, SlipHold};
 use crate::validate;
 
 /// Received bytes that one sample's work looks at: more than the wire brings in a sample.
@@ -57,6 +59,7 @@ pub struct Controller {
     interlocks: Interlocks,
     sequence: Sequence,
     estimation: Estimation,
+    slip_hold: Option<SlipHold>,
     link: Link,
     resources: Resources,
     tick: u32,
@@ -90,6 +93,7 @@ impl Controller {
             interlocks: Interlocks::new(parameters),
             sequence,
             estimation,
+            slip_hold: None,
             link: Link::new(),
             resources: Resources::default(),
             tick: 0,
@@ -165,7 +169,18 @@ impl Controller {
             vehicle_speed_m_s: converted.sample.vehicle_speed_m_s,
             stop: core::mem::take(&mut self.stop),
         };
-        let demand = self.sequence.step(&observed, |_| 0.0);
+        let (parameters, estimation) = (&self.parameters, &mut self.estimation);
+        let slip_hold = &mut self.slip_hold;
+        let demand = self.sequence.step(&observed, |target| {
+            hold_slip(slip_hold, parameters, target, &converted.sample).unwrap_or_else(|Refused| {
+                // No demand on this sample, a fault on the next.
+                estimation.fail();
+                0.0
+            })
+        });
+        if self.sequence.state() != State::Ramp {
+            self.slip_hold = None;
+        }
         if matches!(before, State::Ramp | State::Skid | State::Release)
             && self.sequence.state() != State::Fault
         {
@@ -216,7 +231,8 @@ impl Controller {
             // Zeros that cannot be stored still hold until the next reset.
             self.identity.stored = actuators.store(&self.parameters).is_ok();
         }
-        for (tick, event) in core::mem::take(&mut self.events) {
+        // By reference: the queue's own iterator has an index that may panic.
+        for &(tick, event) in &core::mem::take(&mut self.events) {
             self.link
                 .send(Telemetry::Event { tick, event }, Urgency::Prompt, wire);
         }
@@ -227,6 +243,11 @@ impl Controller {
                 let estimate = self.estimation.report(self.tick);
                 self.link
                     .send(Telemetry::Estimate(estimate), Urgency::Stream, wire);
+                if let Some(slip_hold) = &self.slip_hold {
+                    let report = slip_hold.report(self.tick);
+                    self.link
+                        .send(Telemetry::QuarterCar(report), Urgency::Stream, wire);
+                }
             }
         }
     }
@@ -319,7 +340,7 @@ impl Controller {
     }
 
     fn start(&mut self, profile: &muslip_record::Profile) -> Result<(), Refusal> {
-        if !validate::profile(profile) || matches!(profile.program, Program::SlipHold { .. }) {
+        if !validate::profile(profile) {
             return Err(Refusal::Profile);
         }
         let before = self.sequence.state();
@@ -427,6 +448,20 @@ impl Controller {
         // More than eight in one sample cannot happen; were it so, the first are the ones to keep.
         let _ = self.events.push((self.tick, event));
     }
+}
+
+/// A sample of slip hold, begun with the first.
+fn hold_slip(
+    slip_hold: &mut Option<SlipHold>,
+    parameters: &Parameters,
+    target_slip: f32,
+    sample: &RigSample<f32>,
+) -> Result<f32, Refused> {
+    let hold = match slip_hold {
+        Some(hold) => hold,
+        None => slip_hold.insert(SlipHold::new(parameters, target_slip, sample)?),
+    };
+    hold.step(sample)
 }
 
 /// Number of the filter's noise among the parameters.

@@ -74,5 +74,7 @@ pub enum FromFirmware {
     Dumped {
         /// True for a panic, false for a hard fault.
         panic: bool,
+        /// What the valves were told last.
+        output: BrakeOutput,
     },
 }

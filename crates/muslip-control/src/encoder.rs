@@ -117,7 +117,8 @@ impl SpeedMeter {
         let age_s = reading.age_ticks as f32 * TICK_S;
         if !pulsed {
             let bound = self.radians_per_pulse / age_s.max(TICK_S);
-            self.speed_rad_s = self.speed_rad_s.clamp(-bound, bound);
+            // Not `clamp`, which panics where the bounds are not in order.
+            self.speed_rad_s = self.speed_rad_s.min(bound).max(-bound);
         }
         Speed {
             rad_s: self.speed_rad_s,

@@ -59,6 +59,11 @@ impl Estimation {
         self.failed
     }
 
+    /// Says that another estimator has failed: a fault like its own.
+    pub fn fail(&mut self) {
+        self.failed = true;
+    }
+
     /// Slip and friction of the sample, none where it is no measurement.
     pub fn observe(&mut self, sample: &RigSample<f32>) -> Option<SlipFriction<f32>> {
         self.point = slip_friction(sample, self.effective_radius_m, &self.limits).ok();

@@ -28,6 +28,7 @@ pub mod estimation;
 pub mod interlock;
 pub mod link;
 pub mod sequence;
+pub mod slip_hold;
 pub mod store;
 pub mod validate;
 

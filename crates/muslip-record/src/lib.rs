@@ -46,7 +46,7 @@ pub use parameters::{
 };
 pub use wire::{
     Answer, Command, Envelope, Estimate, Event, Fault, Hello, LinkCounters, Profile, Program,
-    Refusal, STEPS, Sample, State, Status, Telemetry,
+    QuarterCar, Refusal, STEPS, Sample, State, Status, Telemetry,
 };
 
 /// Version of the protocol: raised when the meaning of a field changes though its type does not.

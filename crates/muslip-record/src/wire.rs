@@ -106,6 +106,8 @@ pub enum Telemetry {
     Sample(Sample),
     /// The estimate; 100 a second.
     Estimate(Estimate),
+    /// The quarter-car filter's estimate while slip is held; 100 a second.
+    QuarterCar(QuarterCar),
     /// Something happened.
     Event {
         /// Sample at which it happened.
@@ -284,6 +286,17 @@ pub struct Estimate {
     pub p11: f32,
     /// Samples that went into it.
     pub updates: u32,
+}
+
+/// The quarter-car filter's estimate, with its covariance.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct QuarterCar {
+    /// Sample of which it is.
+    pub tick: u32,
+    /// Wheel speed in rad/s, vehicle speed in m/s, slip, friction, mass in kg.
+    pub state: [f32; 5],
+    /// Their covariance: the upper triangle, row by row.
+    pub covariance: [f32; 15],
 }
 
 /// What the link has seen.

@@ -34,7 +34,7 @@ pub(super) fn run(arguments: &Arguments, terminal: &mut Terminal) -> Result<(), 
         recording_path: &recording,
         model_path: None,
         options: EstimateOptions {
-            estimator: EstimatorKind::Article,
+            estimator: Some(EstimatorKind::Article),
             range: Range::Automotive,
         },
         trace: Some(&trace),

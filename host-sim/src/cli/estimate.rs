@@ -42,9 +42,10 @@ pub(super) struct Arguments {
     /// itself.
     #[arg(long, value_enum, default_value_t = RangeChoice::Aircraft)]
     range: RangeChoice,
-    /// Which filter estimates.
-    #[arg(long, value_enum, default_value_t = EstimatorChoice::Article)]
-    estimator: EstimatorChoice,
+    /// Which filter estimates; efficient unless a model with a low-pass filter on the force is
+    /// compensated.
+    #[arg(long, value_enum)]
+    estimator: Option<EstimatorChoice>,
     /// Compensate what a diagnosis found, sample by sample: `model.toml` as `diagnose` writes it. Effects
     /// that can be compensated are radius, delay, lag, zero drift, crosstalk, load and speed
     /// sensitivity, relaxation and tread temperature; others are named and left.
@@ -84,22 +85,17 @@ impl From<RangeChoice> for Range {
 /// `--estimator`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum EstimatorChoice {
-    /// The article's extended Kalman filter.
+    /// The article's extended Kalman filter: three times the noise, pseudonoise.
     Article,
-    /// Not part of this version.
-    #[value(hide = true)]
+    /// As accurate as a batch fit by maximum likelihood; learns the noise, rejects outliers.
     Efficient,
 }
 
 pub(super) fn run(arguments: &Arguments, terminal: &mut Terminal) -> Result<(), Failure> {
-    let estimator = match arguments.estimator {
+    let estimator = arguments.estimator.map(|choice| match choice {
         EstimatorChoice::Article => EstimatorKind::Article,
-        EstimatorChoice::Efficient => {
-            return Err(Failure::Usage(
-                "--estimator efficient is not part of this version; use article".into(),
-            ));
-        }
-    };
+        EstimatorChoice::Efficient => EstimatorKind::Efficient,
+    });
     let trace_is_printed = arguments.trace.as_deref() == Some(Path::new(PRINTED));
     if trace_is_printed && arguments.json {
         return Err(Failure::Usage(
@@ -191,7 +187,7 @@ impl Job<'_> {
                 self.recording_path,
                 &result,
                 self.beside.as_ref(),
-                &self.command(),
+                &self.command(&result),
             );
             write_file(path, page.to_html()?.as_bytes())?;
         }
@@ -209,7 +205,7 @@ impl Job<'_> {
     }
 
     /// The command that makes the report again.
-    fn command(&self) -> String {
+    fn command(&self, result: &EstimateResult) -> String {
         let model = match self.model_path {
             Some(path) => format!("--model {} ", path.display()),
             None => String::new(),
@@ -218,7 +214,7 @@ impl Job<'_> {
             "muslip estimate --rig {} --range {} --estimator {} {model}{}",
             self.rig_path.display(),
             crate::estimate::range_word(self.options.range),
-            self.options.estimator.word(),
+            result.estimator.word(),
             self.recording_path.display()
         )
     }
@@ -299,9 +295,6 @@ pub(super) fn tell(result: &EstimateResult, terminal: &mut Terminal) -> Result<(
     for sentence in result.model.iter().flat_map(model_sentences) {
         terminal.paragraph(&sentence)?;
     }
-    terminal.paragraph(&consistency_sentence(
-        &result.consistency,
-        result.options.estimator,
-    ))?;
+    terminal.paragraph(&consistency_sentence(&result.consistency, result.estimator))?;
     terminal.paragraph(&noise_sentence(&result.survey))
 }

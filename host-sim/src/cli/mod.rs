@@ -11,6 +11,8 @@ mod fit;
 mod paper;
 mod predict;
 mod progress;
+mod quarter_car;
+mod rig;
 mod simulate;
 mod terminal;
 
@@ -47,7 +49,9 @@ enum Command {
     Predict(predict::Arguments),
     Simulate(simulate::Arguments),
     Paper(paper::Arguments),
+    QuarterCar(quarter_car::Arguments),
     Demo(demo::Arguments),
+    Rig(rig::Arguments),
     Completions(completions::Arguments),
 }
 
@@ -104,7 +108,9 @@ pub fn main() -> ExitCode {
         Command::Predict(arguments) => predict::run(&arguments, &mut terminal),
         Command::Simulate(arguments) => simulate::run(&arguments, &mut terminal),
         Command::Paper(arguments) => paper::run(&arguments, &mut terminal),
+        Command::QuarterCar(arguments) => quarter_car::run(&arguments, &mut terminal),
         Command::Demo(arguments) => demo::run(&arguments, &mut terminal),
+        Command::Rig(arguments) => rig::run(&arguments, &mut terminal),
         Command::Completions(arguments) => completions::run(&arguments, &mut terminal),
     };
     match outcome {

@@ -8,8 +8,9 @@ mod trace;
 use std::io::{self, Write};
 
 use muslip::compensate::{Compensated, NoMeasurement};
+use muslip::filter::efficient::{self, EfficientFilter};
 use muslip::filter::mu_slip::{
-    Config, ConfigError, Estimate, Fusion, MuSlipFilter, Range, UpdateError,
+    Config, ConfigError, Decision, Estimate, Fusion, MuSlipFilter, Range, State,
 };
 use muslip::filter::{Estimator, FrictionMeasurement, PeakEstimate};
 use muslip::law::rudd::Expansion;
@@ -41,6 +42,8 @@ pub enum EstimatorKind {
     /// The two-state extended Kalman filter of Rudd's article: three times the measurement sigma, and
     /// pseudonoise.
     Article,
+    /// The efficient one: as accurate as a batch fit by maximum likelihood, with the noise learnt.
+    Efficient,
 }
 
 impl EstimatorKind {
@@ -48,6 +51,7 @@ impl EstimatorKind {
     pub fn word(self) -> &'static str {
         match self {
             Self::Article => "article",
+            Self::Efficient => "efficient",
         }
     }
 }
@@ -55,8 +59,9 @@ impl EstimatorKind {
 /// How to estimate.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct EstimateOptions {
-    /// Which filter.
-    pub estimator: EstimatorKind,
+    /// Which filter; `None`: the efficient one, or the article's where a model is compensated that the
+    /// efficient one cannot stand behind (a low-pass filter on the force).
+    pub estimator: Option<EstimatorKind>,
     /// Where it starts.
     pub range: Range,
 }
@@ -75,8 +80,10 @@ pub struct Step {
 /// What came out.
 #[derive(Debug, Clone)]
 pub struct EstimateResult {
-    /// How it was estimated.
+    /// How it was to be estimated.
     pub options: EstimateOptions,
+    /// Which filter estimated.
+    pub estimator: EstimatorKind,
     /// The final estimate.
     pub peak: PeakEstimate<f64>,
     /// Samples that were used.
@@ -104,9 +111,9 @@ pub enum EstimateError {
     /// The filter's configuration is unsound.
     #[error(transparent)]
     Config(#[from] ConfigError),
-    /// The filter refuses its own earlier state, which no sound filter does.
+    /// The same of the efficient estimator.
     #[error(transparent)]
-    Filter(#[from] UpdateError),
+    EfficientConfig(#[from] efficient::ConfigError),
     /// The model's figures are none that can be compensated.
     #[error("the model cannot be compensated: {0}")]
     Model(String),
@@ -156,20 +163,82 @@ pub fn estimate<W: Write>(
         let compensator = model::compensator(used, radius_m, &survey);
         front.compensator = Some(compensator.map_err(EstimateError::Model)?);
     }
-    match options.estimator {
-        EstimatorKind::Article => {
-            let filter = Config::for_range(options.range).build()?;
-            let mut result = run(
-                filter,
-                front,
-                recording,
-                options,
-                survey,
-                trace,
-                &mut progress,
-            )?;
-            result.model = model;
-            Ok(result)
+    let filtered = model.as_ref().is_some_and(ModelUse::filters_force);
+    let kind = match options.estimator {
+        Some(EstimatorKind::Efficient) if filtered => {
+            return Err(EstimateError::Model(
+                "the efficient estimator does not stand behind a low-pass filter on the force; use --estimator article".to_owned(),
+            ));
+        }
+        Some(kind) => kind,
+        None if filtered => EstimatorKind::Article,
+        None => EstimatorKind::Efficient,
+    };
+    let filter = match kind {
+        EstimatorKind::Article => Filter::Article(Config::for_range(options.range).build()?),
+        EstimatorKind::Efficient => {
+            Filter::Efficient(efficient::Config::for_range(options.range).build()?)
+        }
+    };
+    let mut result = run(
+        filter,
+        front,
+        recording,
+        options,
+        survey,
+        trace,
+        &mut progress,
+    )?;
+    result.model = model;
+    result.estimator = kind;
+    Ok(result)
+}
+
+/// One of the filters.
+#[derive(Debug, Clone, Copy)]
+#[expect(clippy::large_enum_variant, reason = "one of it in a run")]
+enum Filter {
+    Article(MuSlipFilter<f64>),
+    Efficient(EfficientFilter<f64>),
+}
+
+impl Filter {
+    /// Corrects with one measurement; `None` if the filter refuses or rejects it.
+    fn update(&mut self, measured: &Measured) -> Option<Fusion<f64>> {
+        let before = *self;
+        let fusion = match (&mut *self, measured.expected) {
+            (Self::Article(filter), Some(expected)) => {
+                filter.update_expecting(&measured.measurement, expected)
+            }
+            (Self::Article(filter), None) => filter.update(&measured.measurement),
+            // Without a low-pass filter on the force a compensated reading is the law at its slip.
+            (Self::Efficient(filter), _) => filter.update(&measured.measurement),
+        };
+        // A squared innovation that overflows (a reading of 1e308, say) makes no figure that is one.
+        match fusion {
+            Ok(fusion) if !fusion.nis.is_finite() => {
+                *self = before;
+                None
+            }
+            Ok(fusion) => (fusion.decision == Decision::Accepted).then_some(fusion),
+            Err(_) => None,
+        }
+    }
+
+    fn estimate(&self) -> Estimate<f64> {
+        match self {
+            Self::Article(filter) => filter.estimate(),
+            Self::Efficient(filter) => Estimate {
+                state: filter.state(),
+                covariance: filter.covariance(),
+            },
+        }
+    }
+
+    fn peak(&self) -> PeakEstimate<f64> {
+        match self {
+            Self::Article(filter) => filter.peak(),
+            Self::Efficient(filter) => filter.peak(),
         }
     }
 }
@@ -193,12 +262,7 @@ struct Front {
 
 impl Front {
     /// The row as a measurement at the filter's present state; `None`, counted, if it is none.
-    fn measured(
-        &mut self,
-        row: &Row<'_>,
-        survey: &Survey,
-        state: &muslip::filter::mu_slip::State<f64>,
-    ) -> Option<Measured> {
+    fn measured(&mut self, row: &Row<'_>, survey: &Survey, state: &State<f64>) -> Option<Measured> {
         let time_s = row.time_s();
         if !time_s.is_finite() {
             self.skipped.not_finite += 1;
@@ -254,7 +318,7 @@ impl Front {
 }
 
 fn run<W: Write>(
-    mut filter: MuSlipFilter<f64>,
+    mut filter: Filter,
     mut front: Front,
     recording: &mut Recording,
     options: EstimateOptions,
@@ -271,23 +335,12 @@ fn run<W: Write>(
     let mut refused = 0;
     let mut outcome = Ok(());
     let mut take = |row: &Row<'_>| -> Result<(), EstimateError> {
-        let Some(measured) = front.measured(row, &survey, &filter.state()) else {
+        let Some(measured) = front.measured(row, &survey, &filter.estimate().state) else {
             return Ok(());
         };
-        let before = filter.estimate();
-        let outcome = match measured.expected {
-            Some(expected) => filter.update_expecting(&measured.measurement, expected),
-            None => filter.update(&measured.measurement),
-        };
-        // A refused update leaves the filter as it was; the sample is counted and passed over. So is
-        // one whose squared innovation overflows (a reading of 1e308, say): no figure made with it
-        // would be one.
-        let fusion = match outcome {
-            Ok(fusion) if fusion.nis.is_finite() => fusion,
-            _ => {
-                refused += 1;
-                return Ok(filter.restore(before)?);
-            }
+        let Some(fusion) = filter.update(&measured) else {
+            refused += 1;
+            return Ok(());
         };
         used += 1;
         test.add(fusion.innovation / fusion.innovation_variance.sqrt());
@@ -335,6 +388,7 @@ fn run<W: Write>(
     }
     Ok(EstimateResult {
         options,
+        estimator: EstimatorKind::Article,
         peak: filter.peak(),
         used,
         skipped,
@@ -390,7 +444,7 @@ impl EstimateResult {
         let c = self.consistency;
         let mut object = json!({
             "schema": "muslip.estimate/1",
-            "estimator": self.options.estimator.word(),
+            "estimator": self.estimator.word(),
             "range": range_word(self.options.range),
             "peak_friction": Quantity { value: peak.peak_friction, std: peak.peak_friction_std },
             "critical_slip": Quantity { value: peak.critical_slip, std: peak.critical_slip_std },

@@ -318,6 +318,12 @@ impl ModelUse {
         })
     }
 
+    /// Whether the force is compensated for a low-pass filter: a reading is then not the law at its slip.
+    pub fn filters_force(&self) -> bool {
+        self.compensation.force_lag.is_some()
+            || matches!(self.compensation.relaxation, Some(Relaxation::Force { .. }))
+    }
+
     /// Mechanisms that are compensated.
     pub fn compensated(&self) -> impl Iterator<Item = &ModelledMechanism> {
         self.mechanisms

@@ -58,7 +58,7 @@ pub fn of_estimate(
         subject: format!(
             "{}, estimator {}, range {}",
             recording.display(),
-            result.options.estimator.word(),
+            result.estimator.word(),
             range_word(result.options.range)
         ),
         verdict: estimate_sentence(result),
@@ -92,7 +92,7 @@ pub fn of_estimate(
             Section {
                 heading: "Is the filter consistent?".into(),
                 blocks: vec![
-                    Block::Paragraph(consistency_sentence(consistency, result.options.estimator)),
+                    Block::Paragraph(consistency_sentence(consistency, result.estimator)),
                     Block::Figure(nis_figure(result)),
                 ],
             },

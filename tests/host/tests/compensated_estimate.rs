@@ -302,7 +302,14 @@ fn compensation_takes_the_bias_away() {
         for seed in 0..SEEDS {
             scratch.write("run.csv", recording(&case, seed));
             for (with, bias) in bias.iter_mut().enumerate() {
-                let mut arguments = vec!["estimate", "--rig", "rig.toml", "--json"];
+                let mut arguments = vec![
+                    "estimate",
+                    "--rig",
+                    "rig.toml",
+                    "--estimator",
+                    "article",
+                    "--json",
+                ];
                 if with == 1 {
                     arguments.extend(["--model", "model.toml"]);
                 }
@@ -337,6 +344,38 @@ fn compensation_takes_the_bias_away() {
         );
         // Six seeds of a filter that takes three times the noise: the mean has a sigma of 0.14.
         assert!(size(after) < 0.5, "{}: {after:?}", case.id);
+    }
+}
+
+#[test]
+fn the_efficient_estimator_compensates_too_but_for_filtered_forces() {
+    for case in cases() {
+        let scratch = Scratch::with_rig(RIG);
+        scratch.write("model.toml", model(&case));
+        scratch.write("run.csv", recording(&case, 1));
+        let plain = [
+            "estimate",
+            "--rig",
+            "rig.toml",
+            "--model",
+            "model.toml",
+            "--json",
+            "run.csv",
+        ];
+        let told = scratch.json(&plain);
+        if case.id == "force_lag" || case.form == "force" {
+            assert_eq!(told["estimator"], "article");
+            let complaint =
+                scratch.complaint(&[&plain[..], &["--estimator", "efficient"]].concat());
+            assert!(complaint.contains("low-pass filter"), "{complaint}");
+            continue;
+        }
+        assert_eq!(told["estimator"], "efficient");
+        for (name, truth) in [("peak_friction", PEAK), ("critical_slip", CRITICAL)] {
+            let error = number(&told, &format!("{name}.value")) - truth;
+            let sigmas = error / number(&told, &format!("{name}.std"));
+            assert!(sigmas.abs() < 4.0, "{}: {name} {sigmas}", case.id);
+        }
     }
 }
 

@@ -6,7 +6,14 @@ use common::{HEADER, RIG, Scratch, measured_data, number, recording_of};
 use serde_json::{Value, json};
 use test_support::scenario::article;
 
-const ESTIMATE: [&str; 4] = ["estimate", "--rig", "rig.toml", "--json"];
+const ESTIMATE: [&str; 6] = [
+    "estimate",
+    "--rig",
+    "rig.toml",
+    "--estimator",
+    "article",
+    "--json",
+];
 
 fn article_rig() -> String {
     // Friction noise 0.04 under 1000 N.
@@ -158,7 +165,16 @@ fn the_article_s_filter_is_conservative_at_about_a_tenth() {
 fn a_printed_trace_is_the_written_one_and_nothing_else() {
     let scratch = article_scratch(7);
     estimate(&scratch, &["--trace", "t.csv"]);
-    let printed = scratch.output(&["estimate", "--rig", "rig.toml", "--trace", "-", "run.csv"]);
+    let printed = scratch.output(&[
+        "estimate",
+        "--rig",
+        "rig.toml",
+        "--estimator",
+        "article",
+        "--trace",
+        "-",
+        "run.csv",
+    ]);
     assert_eq!(printed, scratch.read("t.csv"));
     let both = [
         "estimate", "--rig", "rig.toml", "--trace", "-", "--json", "run.csv",
@@ -412,4 +428,21 @@ fn measured_recordings_give_curves_of_a_tyre() {
         estimates += 1;
     }
     assert_eq!(estimates, 4);
+}
+
+#[test]
+fn the_efficient_estimator_is_the_default_and_believes_its_own_noise() {
+    let mut consistent = 0;
+    for seed in 0..20 {
+        let scratch = article_scratch(seed);
+        let json = scratch.json(&["estimate", "--rig", "rig.toml", "--json", "run.csv"]);
+        assert_eq!(json["estimator"], "efficient");
+        let article = estimate(&scratch, &[]);
+        let std = |of: &Value| number(of, "peak_friction.std");
+        assert!(std(&json) < 0.6 * std(&article));
+        let off = (number(&json, "peak_friction.value") - article::PEAK_FRICTION) / std(&json);
+        assert!(off.abs() < 4.5, "{seed}: {off}");
+        consistent += u32::from(json["consistency"]["verdict"] == "consistent");
+    }
+    assert!(consistent >= 16, "{consistent} of 20");
 }

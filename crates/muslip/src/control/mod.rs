@@ -4,4 +4,6 @@
 //! [`QuarterCarFilter`](crate::filter::quarter_car::QuarterCarFilter), from measured speeds or, in a
 //! simulation, from the truth.
 
+pub mod lock_guard;
+pub mod peak_seeker;
 pub mod slip;

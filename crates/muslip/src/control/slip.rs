@@ -9,7 +9,7 @@
 //!
 //! Slip moves as dλ/dt = R/(J v) (T − R F) while speed hardly changes, F being the tyre's force; with the
 //! tyre's torque R F fed forward the loop is dλ/dt = B e at every speed and on both sides of the peak,
-//! B (rad/s) its bandwidth. Equations (34)-(36) of docs/model.md.
+//! B (rad/s) its bandwidth. Equations (37)-(39) of docs/model.md.
 
 use core::fmt;
 
@@ -282,6 +282,14 @@ impl<T: Real> SlipController<T> {
             brake_torque_nm: torque,
             limit,
         })
+    }
+
+    /// Lowers the torque as fast as the rate allows for one sample and empties the integral: for a guard
+    /// that overrules slip. Called instead of [`SlipController::step`].
+    pub fn release(&mut self) {
+        let reach = self.config.maximum_torque_rate_nm_s * self.config.sample_time_s;
+        self.brake_torque_nm = (self.brake_torque_nm - reach).max(T::ZERO);
+        self.integral_nm = T::ZERO;
     }
 
     fn within_range(&self, torque_nm: T) -> T {

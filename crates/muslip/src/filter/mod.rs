@@ -5,8 +5,10 @@
 //! filter whose measurement is another (forces and speeds of a quarter car, with a time step) states it
 //! as its [`Estimator::Measurement`].
 
+pub mod efficient;
 pub mod mu_slip;
 pub mod quarter_car;
+pub mod road_bank;
 
 use crate::real::Real;
 

@@ -18,7 +18,7 @@
 //! the standard deviations of P's diagonal (and a correlation of 1 for the cross term; the mup-mup term
 //! is zero). They keep the filter from trusting a linearisation that its own uncertainty exceeds.
 //!
-//! Four ways in, one arithmetic: [`update`] (lean, for the loop of a controller), [`update_reporting`]
+//! Five ways in: [`update_unchecked`] (leanest, one division), [`update`] (the same checked, two divisions), [`update_reporting`]
 //! (the same with innovation, noise and gain), [`update_expecting`] (for a measurement that reads
 //! something made of the law, see [`compensate`](crate::compensate)), and [`MuSlipFilter`], which adds
 //! configuration, an optional gate and the [`Estimator`](crate::filter::Estimator) trait.
@@ -36,4 +36,4 @@ pub use config::{Config, CovarianceForm, Range};
 pub use error::{ConfigError, ConfigParameter, Input, UpdateError};
 pub use filter::MuSlipFilter;
 pub use state::{Covariance, Estimate, State};
-pub use update::{Decision, Fusion, update, update_expecting, update_reporting};
+pub use update::{Decision, Fusion, update, update_expecting, update_reporting, update_unchecked};

@@ -274,6 +274,62 @@ pub fn update<T: Real>(
     Ok((step.state, step.covariance))
 }
 
+/// [`update`] with one division and without a check, for the loop of a controller that checks its inputs.
+///
+/// All is scaled by powers of d = s² + sp², so that only the variance of the innovation is divided by:
+/// with h = d² H, ½ d³ ∂²mu/∂sp² = c and b = d² ∂²mu/∂mup∂sp
+///
+/// ```text
+/// S d⁶ = d² (h P hᵀ + b² P11 P22 + (n σ)² d⁴) + (c P22)²
+/// ```
+///
+/// Equal to [`update`] but for rounding. In `f32` S d⁶ keeps its precision for s or sp above 1e-4.
+/// Arguments and ranges are those of [`update`]; what is outside them spoils the result, and nothing
+/// tells.
+#[inline]
+#[must_use]
+pub fn update_unchecked<T: Real>(
+    state: State<T>,
+    covariance: Covariance<T>,
+    slip_ratio: T,
+    friction: T,
+    measurement_variance: T,
+) -> (State<T>, Covariance<T>) {
+    let State {
+        peak_friction: mup,
+        critical_slip: sp,
+    } = state;
+    let Covariance { p00, p01, p11 } = covariance;
+    let (ss, pp) = (slip_ratio * slip_ratio, sp * sp);
+    let twice = slip_ratio + slip_ratio;
+    let (d, difference) = (ss + pp, ss - pp);
+    let arm = twice * sp;
+    let b = twice * difference;
+    let (dd, h0) = (d * d, arm * d);
+    let h1 = mup * b;
+    // sp² - 3 s² = -(d + 2 (s² - sp²)), and its sign is squared away.
+    let bend = d + (difference + difference);
+    let c = (mup * arm) * bend;
+    let (g0, g1) = (p00 * h0 + p01 * h1, p01 * h0 + p11 * h1);
+    let noise = measurement_variance * (dd * dd) + (b * b) * (p00 * p11);
+    let cp = c * p11;
+    let scaled = dd * (noise + h0 * g0 + h1 * g1) + cp * cp;
+    let gain = dd / scaled;
+    let innovation = friction * dd - mup * h0;
+    let (k0, k1) = (g0 * gain, g1 * gain);
+    (
+        State {
+            peak_friction: mup + k0 * innovation,
+            critical_slip: sp + k1 * innovation,
+        },
+        Covariance {
+            p00: p00 - k0 * g0,
+            p01: p01 - k0 * g1,
+            p11: p11 - k1 * g1,
+        },
+    )
+}
+
 /// [`update`], bit for bit, with what it did.
 ///
 /// # Errors

@@ -25,6 +25,9 @@ pub struct QuarterCarFilter<T> {
 /// estimate that is off, not the sensor.
 const GATE_PATIENCE: u8 = 5;
 
+/// Smallest mass that a correction leaves, as a share of the mass at the start.
+const SMALLEST_MASS: f64 = 0.1;
+
 impl<T: Real> QuarterCarFilter<T> {
     /// The configuration was validated by [`Config::build`].
     pub(super) fn new(config: Config<T>) -> Self {
@@ -186,7 +189,8 @@ impl<T: Real> QuarterCarFilter<T> {
 
     /// Corrects the estimate with one reading, or rejects it: outside the gate (but not more than five in
     /// a row), or a wheel speed that repeats the last reading exactly where the configuration says that a
-    /// healthy sensor does not.
+    /// healthy sensor does not. A correction leaves vehicle speed at or above zero and at least a tenth of
+    /// the mass at the start.
     ///
     /// # Errors
     /// [`StepError`]; the estimate is what it was before.
@@ -217,6 +221,9 @@ impl<T: Real> QuarterCarFilter<T> {
         // Noise must not carry a vehicle that brakes to rest backwards.
         let speed = &mut self.estimate.state.vehicle_speed_m_s;
         *speed = speed.max(T::ZERO);
+        // Friction and mass are seen as a product; both must not change their sign together.
+        let mass = &mut self.estimate.state.mass_kg;
+        *mass = mass.max(T::from_f64(SMALLEST_MASS) * self.config.initial_mass_kg);
         if self.config.keeps_slip_positive {
             self.keep_slip_positive();
         }
@@ -242,6 +249,11 @@ impl<T: Real> QuarterCarFilter<T> {
                 ..*covariance
             };
         }
+    }
+
+    /// The same filter at another estimate, unchecked: for mixtures of estimates that were checked.
+    pub(crate) fn at(&self, estimate: Estimate<T>) -> Self {
+        Self { estimate, ..*self }
     }
 
     /// The 5×5 Jacobian F of the model at a state and a brake torque in N m, order ω, v, λ, μ, m; for

@@ -259,4 +259,16 @@ impl<T: Real> Covariance<T> {
             .all(|row| row.iter().all(|value| value.is_finite()))
             && self.variances().iter().all(|value| *value >= T::ZERO)
     }
+
+    /// `self` plus `share` times (`other` plus d dᵀ): one term of a mixture, d being the other's mean less
+    /// the mixture's.
+    pub(crate) fn plus_spread(&self, other: &Self, difference: [T; 5], share: T) -> Self {
+        let mut rows = self.rows();
+        for ((row, others), d_row) in rows.iter_mut().zip(other.rows()).zip(difference) {
+            for ((value, theirs), d_column) in row.iter_mut().zip(others).zip(difference) {
+                *value += share * (theirs + d_row * d_column);
+            }
+        }
+        Self::from_rows(rows)
+    }
 }

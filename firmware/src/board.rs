@@ -1,0 +1,192 @@
+//! Which board this is, and its start-up.
+
+use muslip_control::board::{Actuators, Board, NotStored, RawSample, Sensors};
+use muslip_control::brake::BrakeOutput;
+use muslip_control::controller::{Controller, Identity};
+use muslip_record::{Parameters, SAMPLE_RATE_HZ};
+use stm32f4::stm32f405::{Peripherals, USART1};
+
+use crate::settings::{CORE_HZ, HSI_HZ};
+use crate::uart::LinkEnd;
+use crate::{chip, emulator, uart};
+
+/// The board, whichever it is.
+pub struct AnyBoard {
+    sensors: AnySensors,
+    actuators: AnyActuators,
+}
+
+/// Its sensors.
+pub enum AnySensors {
+    /// Those of the rig.
+    Chip(chip::ChipSensors),
+    /// Those of the simulator.
+    Emulated(emulator::EmulatedSensors),
+}
+
+/// Its valves.
+pub enum AnyActuators {
+    /// Those of the rig.
+    Chip(chip::ChipActuators),
+    /// Those of the simulator.
+    Emulated(emulator::EmulatedActuators),
+}
+
+impl Board for AnyBoard {
+    type Sensors = AnySensors;
+    type Actuators = AnyActuators;
+
+    fn split(self) -> (AnySensors, AnyActuators) {
+        (self.sensors, self.actuators)
+    }
+}
+
+impl Sensors for AnySensors {
+    fn read(&mut self) -> RawSample {
+        match self {
+            Self::Chip(sensors) => sensors.read(),
+            Self::Emulated(sensors) => sensors.read(),
+        }
+    }
+
+    fn dump(&mut self) {
+        match self {
+            Self::Chip(sensors) => sensors.dump(),
+            Self::Emulated(sensors) => sensors.dump(),
+        }
+    }
+}
+
+impl Actuators for AnyActuators {
+    fn actuate(&mut self, output: BrakeOutput) {
+        match self {
+            Self::Chip(actuators) => actuators.actuate(output),
+            Self::Emulated(actuators) => actuators.actuate(output),
+        }
+    }
+
+    fn feed_watchdog(&mut self) {
+        match self {
+            Self::Chip(actuators) => actuators.feed_watchdog(),
+            Self::Emulated(actuators) => actuators.feed_watchdog(),
+        }
+    }
+
+    fn store(&mut self, parameters: &Parameters) -> Result<(), NotStored> {
+        match self {
+            Self::Chip(actuators) => actuators.store(parameters),
+            Self::Emulated(actuators) => actuators.store(parameters),
+        }
+    }
+}
+
+/// What start-up leaves to the main loop.
+pub struct Started {
+    /// The board.
+    pub board: AnyBoard,
+    /// The controller; none only if start-up ran twice.
+    pub controller: Option<&'static mut Controller>,
+    /// The host link; none only if start-up ran twice.
+    pub link: Option<LinkEnd>,
+    /// The log's UART.
+    pub log: USART1,
+}
+
+/// Dumps the brake, then finds out where it runs and sets that up.
+#[allow(unsafe_code)]
+pub fn start() -> Started {
+    // SAFETY: called once, from `main`, before any interrupt is enabled.
+    let peripherals = unsafe { Peripherals::steal() };
+    // Set on silicon whenever the core runs from reset; never in QEMU, which does not model RCC.
+    let emulated = peripherals.RCC.cr().read().bits() & 1 << 1 == 0;
+    let (board, identity, parameters) = if emulated {
+        let (sensors, actuators) = emulator::start(&peripherals.USART3, &peripherals.TIM2);
+        let board = AnyBoard {
+            sensors: AnySensors::Emulated(sensors),
+            actuators: AnyActuators::Emulated(actuators),
+        };
+        let identity = Identity {
+            core_clock_hz: CORE_HZ,
+            emulated,
+            watchdog_reset: false,
+            slow_clock: false,
+            stored: false,
+        };
+        (board, identity, Parameters::default())
+    } else {
+        let up = chip::start(&peripherals);
+        let board = AnyBoard {
+            sensors: AnySensors::Chip(up.sensors),
+            actuators: AnyActuators::Chip(up.actuators),
+        };
+        let identity = Identity {
+            core_clock_hz: if up.full_clock { CORE_HZ } else { HSI_HZ },
+            emulated,
+            watchdog_reset: up.watchdog_reset,
+            slow_clock: !up.full_clock,
+            stored: up.parameters.is_some(),
+        };
+        (board, identity, up.parameters.unwrap_or_default())
+    };
+    let link = uart::start(&peripherals.RCC, &peripherals.USART1, peripherals.USART2);
+    defmt::info!(
+        "muslip: emulated {}, core {} Hz, watchdog reset {}, parameters stored {}",
+        identity.emulated,
+        identity.core_clock_hz,
+        identity.watchdog_reset,
+        identity.stored
+    );
+    // Stored parameters were checked when they were loaded, the default ones by a test.
+    let controller = Controller::new(&parameters, identity)
+        .ok()
+        .and_then(|controller| cortex_m::singleton!(: Controller = controller));
+    Started {
+        board,
+        controller,
+        link,
+        log: peripherals.USART1,
+    }
+}
+
+/// Core cycles, or instructions in the emulator; wraps.
+#[inline]
+pub fn cycles() -> u32 {
+    if emulator::is_active() {
+        emulator::instructions()
+    } else {
+        cortex_m::peripheral::DWT::cycle_count()
+    }
+}
+
+/// Lets samples come: by the timer on the chip, by the simulator's frames in the emulator.
+#[allow(unsafe_code)]
+pub fn start_sampling() {
+    // SAFETY: called once; nobody else has the core's peripherals.
+    let mut core = unsafe { cortex_m::Peripherals::steal() };
+    // SAFETY: the sampling interrupt goes above all others; nothing relies on another order.
+    unsafe {
+        use cortex_m::peripheral::scb::SystemHandler;
+        use stm32f4::stm32f405::Interrupt;
+        core.SCB.set_priority(SystemHandler::SysTick, 0);
+        core.NVIC.set_priority(Interrupt::USART2, 1 << 4);
+        core.NVIC.set_priority(Interrupt::USART3, 2 << 4);
+    }
+    if emulator::is_active() {
+        emulator::say(&muslip_control::emulation::FromFirmware::Ready);
+        return;
+    }
+    core.DCB.enable_trace();
+    core.DWT.enable_cycle_counter();
+    let clock_hz = if chip::runs_at_full_clock() {
+        CORE_HZ
+    } else {
+        HSI_HZ
+    };
+    core.SYST
+        .set_clock_source(cortex_m::peripheral::syst::SystClkSource::Core);
+    core.SYST.set_reload(clock_hz / SAMPLE_RATE_HZ - 1);
+    core.SYST.clear_current();
+    core.SYST.enable_interrupt();
+    core.SYST.enable_counter();
+    chip::start_watchdog();
+}

@@ -1,0 +1,195 @@
+//! The chip's board: STM32F405 at 168 MHz with the rig's sensors and valves.
+//!
+//! None of this runs in QEMU, where RCC, GPIO, TIM1, flash programming and the watchdog are not modelled; it is
+//! reviewed against RM0090 (sections are named at each place) and has never run on silicon.
+
+#![allow(
+    unsafe_code,
+    reason = "raw register values, each from the section of RM0090 named beside it"
+)]
+
+mod bridge;
+mod clock;
+mod encoders;
+mod flash;
+mod gpio;
+mod outputs;
+
+use muslip_control::board::{Actuators, NotStored, RawSample, Sensors};
+use muslip_control::brake::BrakeOutput;
+use muslip_control::store::Store;
+use muslip_record::Parameters;
+use stm32f4::stm32f405::{ADC1, GPIOB, IWDG, Peripherals, TIM1};
+
+use crate::settings::{supply_mv, wait_for};
+use crate::valves::Valves;
+use bridge::Bridge;
+use encoders::Encoders;
+use flash::ParameterFlash;
+use outputs::{DumpPin, ValvePwm};
+
+pub use clock::runs_at_full_clock;
+
+/// Line of GPIOB that holds pressure while it is high.
+const DUMP_LINE: u32 = 0;
+/// Line of GPIOB that is high while the emergency stop's loop is closed.
+const EMERGENCY_STOP_LINE: u32 = 1;
+
+/// The rig's sensors.
+pub struct ChipSensors {
+    encoders: Encoders,
+    bridge: Bridge,
+    adc: ADC1,
+    ports: GPIOB,
+}
+
+/// The rig's valves, watchdog and flash.
+pub struct ChipActuators {
+    valves: Valves<ValvePwm, DumpPin>,
+    store: Store<ParameterFlash>,
+    watchdog: IWDG,
+}
+
+/// What start-up found.
+pub struct Up {
+    /// The rig's sensors.
+    pub sensors: ChipSensors,
+    /// The rig's valves.
+    pub actuators: ChipActuators,
+    /// Parameters from flash.
+    pub parameters: Option<Parameters>,
+    /// Whether the PLL runs.
+    pub full_clock: bool,
+    /// Whether the watchdog caused the reset.
+    pub watchdog_reset: bool,
+}
+
+/// Brake first, then clocks, pins and peripherals.
+pub fn start(_: &Peripherals) -> Up {
+    // SAFETY: called once before interrupts; each part takes the peripherals that are its own.
+    let p = unsafe { Peripherals::steal() };
+    gpio::dump_line_low(&p.RCC, &p.GPIOB);
+    let full_clock = clock::start(&p.RCC, &p.FLASH);
+    // RCC_CSR (7.3.21): IWDGRSTF bit 29; RMVF bit 24 clears the flags.
+    let watchdog_reset = p.RCC.csr().read().bits() & 1 << 29 != 0;
+    p.RCC
+        .csr()
+        .modify(|r, w| unsafe { w.bits(r.bits() | 1 << 24) });
+    gpio::start(&p.RCC, &p.GPIOA, &p.GPIOB, &p.GPIOC);
+    start_supply(&p.RCC, &p.ADC1);
+    let valves = Valves::new(outputs::start_pwm(&p.RCC, p.TIM1), DumpPin);
+    let mut store = Store::new(ParameterFlash::new(p.FLASH));
+    let parameters = store.load().ok().flatten();
+    Up {
+        sensors: ChipSensors {
+            encoders: Encoders::start(&p.RCC, p.TIM3, p.TIM4, p.TIM5, p.TIM2),
+            bridge: Bridge::start(&p.RCC, p.SPI2),
+            adc: p.ADC1,
+            ports: p.GPIOB,
+        },
+        actuators: ChipActuators {
+            valves,
+            store,
+            watchdog: p.IWDG,
+        },
+        parameters,
+        full_clock,
+        watchdog_reset,
+    }
+}
+
+/// ADC1 on channel 10 (PC0), one conversion for each sample (13.13: SMPR1, SQR3, CR2).
+fn start_supply(rcc: &stm32f4::stm32f405::RCC, adc: &ADC1) {
+    rcc.apb2enr()
+        .modify(|r, w| unsafe { w.bits(r.bits() | 1 << 8) });
+    adc.smpr1().write(|w| unsafe { w.bits(0b111) });
+    adc.sqr3().write(|w| unsafe { w.bits(10) });
+    adc.cr2().write(|w| unsafe { w.bits(1) });
+    // The first conversion, so that the first sample finds one. t_STAB is 3 us.
+    wait_for(1_000, || false);
+    adc.cr2().write(|w| unsafe { w.bits(1 | 1 << 30) });
+    wait_for(100_000, || adc.sr().read().bits() & 1 << 1 != 0);
+}
+
+/// Dump valve and PWM by the shortest way; from any context, before start-up as well.
+pub fn dump() {
+    // SAFETY: BSRR and CCR1 are written whole; no other context's read-modify-write can undo it.
+    unsafe {
+        (*GPIOB::ptr())
+            .bsrr()
+            .write(|w| w.bits(1 << (DUMP_LINE + 16)));
+        (*TIM1::ptr()).ccr1().write(|w| w.bits(0));
+    }
+}
+
+impl Sensors for ChipSensors {
+    fn read(&mut self) -> RawSample {
+        let [wheel, vehicle] = self.encoders.read();
+        // The result of the conversion started a sample ago.
+        let code = self.adc.dr().read().bits() as u16;
+        self.adc.cr2().write(|w| unsafe { w.bits(1 | 1 << 30) });
+        RawSample {
+            wheel,
+            vehicle,
+            bridge: self.bridge.read(),
+            supply_mv: supply_mv(code),
+            emergency_stop: self.ports.idr().read().bits() & 1 << EMERGENCY_STOP_LINE == 0,
+            late: false,
+        }
+    }
+
+    fn dump(&mut self) {
+        crate::fault::dump();
+    }
+}
+
+/// IWDG keys and settings (21.4): at LSI's 17 to 47 kHz the prescaler 4 and 60 counts are 5 to 14 ms.
+const KEY_START: u32 = 0xCCCC;
+const KEY_FEED: u32 = 0xAAAA;
+const KEY_ACCESS: u32 = 0x5555;
+const RELOAD_SAMPLING: u32 = 60;
+/// Prescaler 64 and 4095 counts: 5.6 s at least, longer than any erase.
+const RELOAD_ERASING: u32 = 4095;
+
+/// Starts the watchdog, for good.
+pub fn start_watchdog() {
+    // SAFETY: IWDG is used here before the main loop does.
+    let watchdog = unsafe { IWDG::steal() };
+    // DBGMCU_APB1_FZ (38.16.4): the watchdog stands while a debugger has stopped the core.
+    unsafe {
+        (*stm32f4::stm32f405::DBGMCU::ptr())
+            .apb1_fz()
+            .modify(|r, w| w.bits(r.bits() | 1 << 12));
+    }
+    watchdog.kr().write(|w| unsafe { w.bits(KEY_START as _) });
+    set_watchdog(&watchdog, 0, RELOAD_SAMPLING);
+}
+
+fn set_watchdog(watchdog: &IWDG, prescaler: u32, reload: u32) {
+    watchdog.kr().write(|w| unsafe { w.bits(KEY_ACCESS as _) });
+    watchdog.pr().write(|w| unsafe { w.bits(prescaler as _) });
+    watchdog.rlr().write(|w| unsafe { w.bits(reload as _) });
+    // Up to five LSI cycles each: 300 us.
+    wait_for(200_000, || watchdog.sr().read().bits() == 0);
+    watchdog.kr().write(|w| unsafe { w.bits(KEY_FEED as _) });
+}
+
+impl Actuators for ChipActuators {
+    fn actuate(&mut self, output: BrakeOutput) {
+        self.valves.set(output);
+    }
+
+    fn feed_watchdog(&mut self) {
+        self.watchdog
+            .kr()
+            .write(|w| unsafe { w.bits(KEY_FEED as _) });
+    }
+
+    fn store(&mut self, parameters: &Parameters) -> Result<(), NotStored> {
+        // An erase stalls the core for up to 2 s (data sheet, table 40).
+        set_watchdog(&self.watchdog, 4, RELOAD_ERASING);
+        let stored = self.store.save(parameters);
+        set_watchdog(&self.watchdog, 0, RELOAD_SAMPLING);
+        stored.map_err(|_| NotStored)
+    }
+}

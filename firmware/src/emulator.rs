@@ -1,0 +1,271 @@
+//! The emulator's board: sensors and valves by frames on USART3.
+
+use core::sync::atomic::{AtomicBool, AtomicU16, AtomicU32, Ordering};
+
+use cortex_m::peripheral::SCB;
+use cortex_m::peripheral::syst::SystClkSource;
+use muslip_control::board::{Actuators, NotStored, RawSample, Sensors};
+use muslip_control::brake::BrakeOutput;
+use muslip_control::emulation::{FromFirmware, ToFirmware};
+use muslip_record::{FRAME_BYTES, FrameReader, Parameters, encode};
+use stm32f4::stm32f405::{Interrupt, NVIC, TIM2, USART3, interrupt};
+
+use crate::cell::InterruptCell;
+use crate::settings::{CYCLES_PER_SAMPLE, wait_for};
+use crate::uart;
+
+/// True once the emulated board is in use.
+static ACTIVE: AtomicBool = AtomicBool::new(false);
+/// The emulated pins: duty in the lower half, dump valve above.
+static PINS: AtomicU32 = AtomicU32::new(0);
+/// Link bytes that must have arrived before the sample's work.
+static EXPECTED: AtomicU32 = AtomicU32::new(0);
+/// Instructions to waste in the sample's work.
+static BURN: AtomicU32 = AtomicU32::new(0);
+/// Samples that the timer is still to raise by itself.
+static FREE_SAMPLES: AtomicU16 = AtomicU16::new(0);
+/// Instruction count at the start of a free run.
+static FREE_START: AtomicU32 = AtomicU32::new(0);
+/// True from the beginning of a free run until it has been told of.
+static FREE_RUN: AtomicBool = AtomicBool::new(false);
+
+/// Sample that the sensors read next: written by USART3's interrupt before it raises the sampling one.
+static MAILBOX: InterruptCell<RawSample> = InterruptCell::new();
+static RECEIVER: InterruptCell<FrameReader> = InterruptCell::new();
+
+const DUMP_VALVE: u32 = 1 << 16;
+
+/// Sensors that read the last frame.
+pub struct EmulatedSensors;
+
+/// Valves that are told of in the next frame.
+pub struct EmulatedActuators;
+
+/// Sets up USART3 and the instruction counter.
+#[allow(unsafe_code)]
+pub fn start(rig: &USART3, counter: &TIM2) -> (EmulatedSensors, EmulatedActuators) {
+    // SAFETY of raw bits: UE, TE, RE, RXNEIE (RM0090, 30.6); TIM2 counting up over 32 bits (18.4). With
+    // `-icount shift=0` it counts instructions.
+    rig.cr1()
+        .write(|w| unsafe { w.bits((1 << 13 | 1 << 3 | 1 << 2 | uart::RXNEIE) as _) });
+    counter.psc().write(|w| unsafe { w.bits(0) });
+    counter.arr().write(|w| unsafe { w.bits(u32::MAX) });
+    counter.cr1().write(|w| unsafe { w.bits(1) });
+    // SAFETY: the interrupts that use them are enabled after this.
+    unsafe {
+        MAILBOX.fill(RawSample::default());
+        RECEIVER.fill(FrameReader::new());
+    }
+    uart::allow(0);
+    ACTIVE.store(true, Ordering::Relaxed);
+    // SAFETY: nothing relies on this interrupt being masked.
+    unsafe { NVIC::unmask(Interrupt::USART3) };
+    (EmulatedSensors, EmulatedActuators)
+}
+
+/// Whether this is the emulator.
+pub fn is_active() -> bool {
+    ACTIVE.load(Ordering::Relaxed)
+}
+
+/// Instructions so far.
+#[allow(unsafe_code)]
+pub fn instructions() -> u32 {
+    // SAFETY: reading a counter has no effect.
+    unsafe { (*TIM2::ptr()).cnt().read().bits() }
+}
+
+/// Dumps the emulated brake.
+pub fn dump() {
+    PINS.store(0, Ordering::Relaxed);
+}
+
+/// What the emulated pins say.
+pub fn output() -> BrakeOutput {
+    let pins = PINS.load(Ordering::Relaxed);
+    BrakeOutput {
+        valve_duty: pins as u16,
+        hold_pressure: pins & DUMP_VALVE != 0,
+    }
+}
+
+impl Sensors for EmulatedSensors {
+    fn read(&mut self) -> RawSample {
+        // SAFETY: USART3's interrupt has written it before the sampling interrupt was raised, and cannot run
+        // while that one does, which is above it.
+        #[allow(unsafe_code)]
+        unsafe { MAILBOX.get() }.copied().unwrap_or_default()
+    }
+
+    fn dump(&mut self) {
+        crate::fault::dump();
+    }
+}
+
+impl Actuators for EmulatedActuators {
+    fn actuate(&mut self, output: BrakeOutput) {
+        let valve = if output.hold_pressure { DUMP_VALVE } else { 0 };
+        PINS.store(u32::from(output.valve_duty) | valve, Ordering::Relaxed);
+    }
+
+    fn feed_watchdog(&mut self) {}
+
+    fn store(&mut self, _: &Parameters) -> Result<(), NotStored> {
+        Err(NotStored)
+    }
+}
+
+/// Waits until the link bytes that belong before this sample have arrived.
+pub fn await_link() {
+    while is_active()
+        && (uart::totals()
+            .0
+            .wrapping_sub(EXPECTED.load(Ordering::Relaxed)) as i32)
+            < 0
+    {
+        cortex_m::asm::wfi();
+    }
+}
+
+/// Wastes as many instructions as the simulator asked for.
+pub fn burn() {
+    // Three instructions a turn: no-operation, subtraction, branch.
+    for _ in 0..BURN.load(Ordering::Relaxed) / 3 {
+        cortex_m::asm::nop();
+    }
+}
+
+/// What a sample's work took, in instructions.
+pub struct Took {
+    /// The sampling interrupt.
+    pub interrupt: u32,
+    /// The control step.
+    pub control: u32,
+    /// The step and the link's work.
+    pub step: u32,
+}
+
+/// Answers the simulator after a sample's work; `totals` are samples raised, worked on and late so far.
+pub fn answer(tick: u32, took: &Took, stack_bytes: u32, totals: [u32; 3]) {
+    if !is_active() {
+        return;
+    }
+    if FREE_RUN.load(Ordering::Relaxed) {
+        if FREE_SAMPLES.load(Ordering::Relaxed) == 0 {
+            FREE_RUN.store(false, Ordering::Relaxed);
+            let [samples, worked, late] = totals;
+            say(&FromFirmware::FreeRun {
+                samples,
+                worked,
+                late,
+                elapsed_ns: instructions().wrapping_sub(FREE_START.load(Ordering::Relaxed)),
+                output: output(),
+            });
+        }
+        return;
+    }
+    say(&FromFirmware::Sample {
+        tick,
+        output: output(),
+        interrupt_instructions: took.interrupt,
+        control_instructions: took.control,
+        step_instructions: took.step,
+        stack_bytes,
+        link_sent: uart::totals().1,
+    });
+}
+
+/// Whether the timer raises samples by itself in the emulator. The core must not sleep then: QEMU's virtual time
+/// leaps when it does, and past its timers. Awake it counts instructions and nothing else.
+pub fn runs_freely() -> bool {
+    FREE_SAMPLES.load(Ordering::Relaxed) > 0
+}
+
+/// Counts a sample that the timer raised by itself; stops it after the last.
+#[allow(unsafe_code)]
+pub fn count_free_sample() {
+    let left = FREE_SAMPLES.load(Ordering::Relaxed);
+    if left > 0 {
+        FREE_SAMPLES.store(left - 1, Ordering::Relaxed);
+        if left == 1 {
+            // SAFETY: CSR of the timer whose handler this is.
+            unsafe { (*cortex_m::peripheral::SYST::PTR).csr.write(0) };
+        }
+    }
+}
+
+/// Sends a frame to the simulator, where there is one.
+#[allow(unsafe_code)]
+pub fn say(message: &FromFirmware) {
+    if !is_active() {
+        return;
+    }
+    let mut buffer = [0; FRAME_BYTES];
+    let Ok(frame) = encode(message, &mut buffer) else {
+        return;
+    };
+    // SAFETY: the transmitter is used by the main loop, and by fault handlers that never return to it.
+    let rig = unsafe { &*USART3::ptr() };
+    for &byte in frame {
+        wait_for(1_000_000, || rig.sr().read().bits() as u32 & uart::TXE != 0);
+        // SAFETY: any byte may be sent.
+        rig.dr().write(|w| unsafe { w.bits(u16::from(byte) as _) });
+    }
+}
+
+#[interrupt]
+fn USART3() {
+    // SAFETY: only this interrupt calls it, and the receiver's registers are read here only.
+    #[allow(unsafe_code)]
+    let (Some(reader), rig) = (unsafe { (RECEIVER.get(), &*USART3::ptr()) }) else {
+        return;
+    };
+    while rig.sr().read().bits() as u32 & uart::RXNE != 0 {
+        let byte = rig.dr().read().bits() as u8;
+        if let Some(Ok(message)) = reader.push::<ToFirmware>(byte) {
+            obey(&message);
+        }
+    }
+}
+
+#[allow(unsafe_code)]
+fn obey(message: &ToFirmware) {
+    match message {
+        ToFirmware::Sample {
+            raw,
+            link_sent,
+            link_room,
+            burn,
+        } => {
+            put(raw, *burn);
+            EXPECTED.store(*link_sent, Ordering::Relaxed);
+            uart::allow(u32::from(*link_room));
+            SCB::set_pendst();
+        }
+        ToFirmware::FreeRun { raw, samples, burn } => {
+            put(raw, *burn);
+            uart::allow(u32::MAX);
+            crate::run::reset_totals();
+            FREE_SAMPLES.store(*samples, Ordering::Relaxed);
+            FREE_RUN.store(true, Ordering::Relaxed);
+            FREE_START.store(instructions(), Ordering::Relaxed);
+            // SAFETY: in the emulator nobody else uses the timer.
+            let mut timer = unsafe { cortex_m::Peripherals::steal() }.SYST;
+            timer.set_clock_source(SystClkSource::Core);
+            timer.set_reload(CYCLES_PER_SAMPLE - 1);
+            timer.clear_current();
+            timer.enable_interrupt();
+            timer.enable_counter();
+        }
+        ToFirmware::HardFault => cortex_m::asm::udf(),
+    }
+}
+
+#[allow(unsafe_code)]
+fn put(raw: &RawSample, burn: u32) {
+    // SAFETY: the sampling interrupt is not pending: the simulator waits for its answer before it sends.
+    if let Some(place) = unsafe { MAILBOX.get() } {
+        *place = *raw;
+    }
+    BURN.store(burn, Ordering::Relaxed);
+}

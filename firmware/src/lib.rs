@@ -1,0 +1,32 @@
+//! The rig controller's board: what lies between `muslip-control` and the registers of an STM32F405.
+//!
+//! On a host this is a small library of what can be tested there: [`valves`], [`log_ring`], [`settings`]. For the
+//! chip it adds the two boards, the interrupts and the main loop. One image serves both boards; which it runs
+//! on is decided at start-up by one bit (see docs/design/0005-controller.md).
+#![no_std]
+#![cfg_attr(not(test), deny(clippy::indexing_slicing))]
+
+pub mod log_ring;
+pub mod settings;
+pub mod valves;
+
+#[cfg(target_os = "none")]
+pub mod board;
+#[cfg(target_os = "none")]
+mod cell;
+#[cfg(target_os = "none")]
+mod chip;
+#[cfg(target_os = "none")]
+mod emulator;
+#[cfg(target_os = "none")]
+mod fault;
+#[cfg(target_os = "none")]
+mod log;
+#[cfg(target_os = "none")]
+mod queue;
+#[cfg(target_os = "none")]
+pub mod run;
+#[cfg(target_os = "none")]
+mod stack;
+#[cfg(target_os = "none")]
+mod uart;

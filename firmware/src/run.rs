@@ -1,0 +1,222 @@
+//! The sampling interrupt and the main loop.
+
+use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
+
+use cortex_m_rt::exception;
+use heapless::spsc::Queue;
+use muslip_control::board::{Actuators, Board, RawSample, Sensors};
+use muslip_control::brake::BrakeOutput;
+use muslip_control::controller::{Controller, Resources};
+use muslip_record::State;
+use stm32f4::stm32f405::USART1;
+
+use crate::board::{AnyActuators, AnySensors, Started};
+use crate::cell::InterruptCell;
+use crate::emulator::{self, Took};
+use crate::queue::{self, Sender, Taker};
+use crate::settings::CYCLES_PER_SAMPLE;
+use crate::uart::LinkEnd;
+use crate::{board, fault, stack, uart};
+
+/// Samples that may wait for the main loop; more than one is already a missed deadline.
+const WAITING_SAMPLES: usize = 4;
+/// Samples between two looks at the stack's paint.
+const SAMPLES_PER_STACK_CHECK: u32 = 64;
+
+/// True while the main loop works on a sample.
+static WORKING: AtomicBool = AtomicBool::new(false);
+/// Samples raised.
+static RAISED: AtomicU32 = AtomicU32::new(0);
+/// Samples raised while the one before was not done.
+static LATE: AtomicU32 = AtomicU32::new(0);
+/// Samples worked on.
+static WORKED: AtomicU32 = AtomicU32::new(0);
+/// Cycles of the last sampling interrupt, and the most of any.
+static INTERRUPT: AtomicU32 = AtomicU32::new(0);
+static WORST_INTERRUPT: AtomicU32 = AtomicU32::new(0);
+
+struct Sampler {
+    sensors: AnySensors,
+    samples: Sender<RawSample>,
+}
+
+static SAMPLER: InterruptCell<Sampler> = InterruptCell::new();
+
+/// Forgets the totals, for a run to be counted by itself.
+pub fn reset_totals() {
+    for total in [&RAISED, &LATE, &WORKED] {
+        total.store(0, Ordering::Relaxed);
+    }
+}
+
+/// The sampling interrupt, 1,000 times a second by the timer or once for each frame of the emulator.
+#[exception]
+fn SysTick() {
+    let start = board::cycles();
+    // SAFETY: only this interrupt calls it.
+    #[allow(unsafe_code)]
+    let Some(sampler) = (unsafe { SAMPLER.get() }) else {
+        return;
+    };
+    emulator::count_free_sample();
+    count(&RAISED);
+    let mut raw = sampler.sensors.read();
+    // The deadline of a sample is the next one.
+    if WORKING.load(Ordering::Relaxed) || !sampler.samples.is_empty() {
+        sampler.sensors.dump();
+        raw.late = true;
+        count(&LATE);
+    }
+    // Full is late by more than a sample; the brake is dumped already.
+    sampler.samples.push(raw);
+    let took = board::cycles().wrapping_sub(start);
+    INTERRUPT.store(took, Ordering::Relaxed);
+    if took > WORST_INTERRUPT.load(Ordering::Relaxed) {
+        WORST_INTERRUPT.store(took, Ordering::Relaxed);
+    }
+}
+
+/// Adds one to a counter that only one context writes.
+fn count(counter: &AtomicU32) {
+    let sum = counter.load(Ordering::Relaxed).wrapping_add(1);
+    counter.store(sum, Ordering::Relaxed);
+}
+
+/// Takes samples for ever.
+pub fn run(started: Started) -> ! {
+    let Started {
+        board,
+        controller,
+        link,
+        log,
+    } = started;
+    let (sensors, actuators) = board.split();
+    let samples = cortex_m::singleton!(: Queue<RawSample, WAITING_SAMPLES> = Queue::new());
+    if let (Some(samples), Some(controller), Some(link)) = (samples, controller, link) {
+        let (producer, consumer) = queue::split(samples);
+        let sampler = Sampler {
+            sensors,
+            samples: producer,
+        };
+        // SAFETY: the timer is started after this.
+        #[allow(unsafe_code)]
+        unsafe {
+            SAMPLER.fill(sampler);
+        }
+        Loop {
+            controller,
+            samples: consumer,
+            actuators,
+            link,
+            log,
+            resources: Resources::default(),
+            state: State::Idle,
+        }
+        .run()
+    }
+    // Start-up failed, which it cannot: brake dumped, watchdog unfed.
+    fault::dump();
+    loop {
+        cortex_m::asm::nop();
+    }
+}
+
+struct Loop {
+    controller: &'static mut Controller,
+    samples: Taker<RawSample>,
+    actuators: AnyActuators,
+    link: LinkEnd,
+    log: USART1,
+    resources: Resources,
+    state: State,
+}
+
+impl Loop {
+    fn run(mut self) -> ! {
+        board::start_sampling();
+        loop {
+            while let Some(raw) = self.samples.pop() {
+                self.work(&raw);
+            }
+            if emulator::runs_freely() {
+                // Without a look at any register: those are slow there.
+                cortex_m::asm::delay(1_000);
+                continue;
+            }
+            if uart::pump_log(&self.log) {
+                continue;
+            }
+            // With interrupts off a sample cannot slip in between the look and the sleep; a pending one
+            // still ends it.
+            cortex_m::interrupt::disable();
+            if !self.samples.ready() {
+                cortex_m::asm::wfi();
+            }
+            // SAFETY: they were on before.
+            #[allow(unsafe_code)]
+            unsafe {
+                cortex_m::interrupt::enable();
+            }
+        }
+    }
+
+    fn work(&mut self, raw: &RawSample) {
+        WORKING.store(true, Ordering::Relaxed);
+        emulator::await_link();
+        let start = board::cycles();
+        let output = self.controller.control(raw);
+        // What the interrupt has dumped stays dumped until the controller itself says so.
+        let output = if fault::dumped(output == BrakeOutput::DUMPED) {
+            BrakeOutput::DUMPED
+        } else {
+            output
+        };
+        self.actuators.actuate(output);
+        let control = board::cycles().wrapping_sub(start);
+        emulator::burn();
+        self.controller.set_overrun_bytes(uart::overrun_bytes());
+        self.controller.set_resources(self.resources);
+        let LinkEnd {
+            receiver,
+            transmitter,
+        } = &mut self.link;
+        self.controller
+            .communicate(|| receiver.receive(), transmitter, &mut self.actuators);
+        let step = board::cycles().wrapping_sub(start);
+        self.actuators.feed_watchdog();
+        WORKING.store(false, Ordering::Relaxed);
+        count(&WORKED);
+        self.account(control, step);
+    }
+
+    fn account(&mut self, control: u32, step: u32) {
+        let interrupt = INTERRUPT.load(Ordering::Relaxed);
+        if step.saturating_add(interrupt) > CYCLES_PER_SAMPLE {
+            self.controller.overran();
+        }
+        let worked = WORKED.load(Ordering::Relaxed);
+        if worked % SAMPLES_PER_STACK_CHECK == 1 {
+            self.resources.stack_used_bytes = stack::used_bytes();
+        }
+        self.resources.worst_interrupt_cycles = WORST_INTERRUPT.load(Ordering::Relaxed);
+        self.resources.worst_step_cycles = self.resources.worst_step_cycles.max(step);
+        uart::kick();
+        let state = self.controller.state();
+        if state != self.state {
+            defmt::info!(
+                "{} -> {}, fault {}",
+                self.state,
+                state,
+                self.controller.fault()
+            );
+            self.state = state;
+        }
+        let took = Took {
+            interrupt,
+            control,
+            step,
+        };
+        let totals = [&RAISED, &WORKED, &LATE].map(|total| total.load(Ordering::Relaxed));
+        emulator::answer(worked, &took, self.resources.stack_used_bytes, totals);
+    }
+}

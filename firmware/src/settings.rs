@@ -1,0 +1,84 @@
+//! Figures that registers are set from.
+
+/// Core clock in Hz once the PLL runs.
+pub const CORE_HZ: u32 = 168_000_000;
+/// Core clock in Hz of the internal oscillator, before that and where the crystal fails.
+pub const HSI_HZ: u32 = 16_000_000;
+/// Clock of APB1's peripherals at full core clock, in Hz.
+pub const APB1_HZ: u32 = 42_000_000;
+/// Clock of APB2's peripherals at full core clock, in Hz.
+pub const APB2_HZ: u32 = 84_000_000;
+/// Bits a second of the log on USART1.
+pub const LOG_BAUD: u32 = 921_600;
+/// Frequency of the proportional valve's PWM in Hz.
+pub const VALVE_PWM_HZ: u32 = 2_000;
+/// Supply of the valves in mV that makes the converter's full scale: 3.3 V behind a divider of 10:1.
+pub const SUPPLY_FULL_SCALE_MV: u32 = 36_300;
+/// Core cycles from one sample to the next.
+pub const CYCLES_PER_SAMPLE: u32 = CORE_HZ / 1_000;
+
+/// PLL from an 8 MHz crystal: M, N, P, Q.
+pub const PLL: [u32; 4] = [8, 336, 2, 7];
+
+/// Value of a USART's BRR at 16-fold oversampling (RM0090, 30.3.4): clock / baud, rounded; its lower four bits are
+/// the fraction. The link's 921,600 come out as 913,043: 0.9 % slow, where receivers allow some 3 %.
+pub const fn baud_divisor(clock_hz: u32, baud: u32) -> u16 {
+    ((clock_hz + baud / 2) / baud) as u16
+}
+
+/// The supply of the valves in mV from the converter's 12 bits.
+pub const fn supply_mv(code: u16) -> u16 {
+    (code as u32 * SUPPLY_FULL_SCALE_MV / 4096) as u16
+}
+
+/// Calls `condition` until it holds, at most `limit` times; whether it did. Every wait on hardware is one of
+/// these: QEMU lacks bits that silicon has, and silicon fails.
+pub fn wait_for(limit: u32, mut condition: impl FnMut() -> bool) -> bool {
+    (0..limit).any(|_| condition())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_pll_makes_the_core_clock_and_48_mhz_within_its_limits() {
+        let [m, n, p, q] = PLL;
+        let input = 8_000_000 / m;
+        assert!((1_000_000..=2_000_000).contains(&input));
+        let vco = input * n;
+        assert!((100_000_000..=432_000_000).contains(&vco));
+        assert_eq!(vco / p, CORE_HZ);
+        assert_eq!(vco / q, 48_000_000);
+        assert_eq!(CORE_HZ / 4, APB1_HZ);
+        assert_eq!(CORE_HZ / 2, APB2_HZ);
+        // Timers of a divided bus run at twice its clock.
+        assert_eq!(2 * APB1_HZ, muslip_control::EDGE_TIMER_HZ);
+    }
+
+    #[test]
+    fn both_uarts_come_within_one_percent_of_their_baud() {
+        for clock in [APB1_HZ, APB2_HZ] {
+            let actual = f64::from(clock) / f64::from(baud_divisor(clock, 921_600));
+            assert!((actual / 921_600.0 - 1.0).abs() < 1e-2, "{actual}");
+        }
+    }
+
+    #[test]
+    fn the_supply_is_read_in_millivolts() {
+        assert_eq!(supply_mv(0), 0);
+        assert_eq!(supply_mv(2708), 23_999);
+        assert!(supply_mv(4095) < 36_300);
+    }
+
+    #[test]
+    fn a_wait_ends_with_its_condition_or_its_limit() {
+        let mut calls = 0;
+        assert!(wait_for(10, || {
+            calls += 1;
+            calls == 4
+        }));
+        assert_eq!(calls, 4);
+        assert!(!wait_for(10, || false));
+    }
+}

@@ -1,0 +1,20 @@
+//! How deep the stack has been: it is painted before `main`, and paint that is gone was used.
+
+use cortex_m_rt::STACK_PAINT_VALUE;
+
+/// Deepest use so far in bytes.
+#[allow(unsafe_code)]
+pub fn used_bytes() -> u32 {
+    unsafe extern "C" {
+        static _stack_start: u32;
+        static _stack_end: u32;
+    }
+    let top = &raw const _stack_start;
+    let mut at = &raw const _stack_end;
+    // SAFETY: both symbols bound the stack's region (memory.x), which is all readable memory; volatile because
+    // this function's own frame lies in it.
+    while at < top && unsafe { at.read_volatile() } == STACK_PAINT_VALUE {
+        at = at.wrapping_add(1);
+    }
+    (top as u32).wrapping_sub(at as u32)
+}

@@ -1,0 +1,220 @@
+//! The host link on USART2 by interrupts, the log on USART1 by polling.
+
+use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
+
+use heapless::spsc::Queue;
+use muslip_control::link::Transmit;
+use muslip_record::LINK_BAUD;
+use stm32f4::stm32f405::{Interrupt, NVIC, RCC, USART1, USART2, interrupt};
+
+use crate::cell::InterruptCell;
+use crate::queue::{self, Sender, Taker};
+use crate::settings::{APB1_HZ, APB2_HZ, LOG_BAUD, baud_divisor};
+
+/// Received bytes that may wait: five samples of a full wire.
+const RECEIVE_BYTES: usize = 512;
+/// Telemetry that may wait.
+const TRANSMIT_BYTES: usize = 2048;
+
+/// Bits of a USART's SR and CR1 (RM0090, 30.6).
+pub const RXNE: u32 = 1 << 5;
+/// Transmit register empty.
+pub const TXE: u32 = 1 << 7;
+const ORE: u32 = 1 << 3;
+const UE: u32 = 1 << 13;
+const TXEIE: u32 = 1 << 7;
+/// Receive interrupt enable.
+pub const RXNEIE: u32 = 1 << 5;
+const TE: u32 = 1 << 3;
+const RE: u32 = 1 << 2;
+
+/// Bytes received on the link so far.
+static RECEIVED: AtomicU32 = AtomicU32::new(0);
+/// Bytes lost because nobody took them.
+static OVERRUN: AtomicU32 = AtomicU32::new(0);
+/// Bytes sent on the link so far.
+static SENT: AtomicU32 = AtomicU32::new(0);
+/// In the emulator, whose UART takes no time: bytes that the wire still takes in this sample.
+static ALLOWANCE: AtomicU32 = AtomicU32::new(0);
+/// Whether the allowance counts.
+static PACED: AtomicBool = AtomicBool::new(false);
+
+struct Line {
+    uart: USART2,
+    received: Sender<u8>,
+    transmit: Taker<u8>,
+}
+
+static LINE: InterruptCell<Line> = InterruptCell::new();
+
+/// The main loop's end of the link.
+pub struct LinkEnd {
+    /// Bytes in.
+    pub receiver: Receiver,
+    /// Bytes out.
+    pub transmitter: Transmitter,
+}
+
+/// Received bytes.
+pub struct Receiver(Taker<u8>);
+
+impl Receiver {
+    /// The oldest received byte.
+    pub fn receive(&mut self) -> Option<u8> {
+        self.0.pop()
+    }
+}
+
+/// Bytes to be sent.
+pub struct Transmitter(Sender<u8>);
+
+impl Transmit for Transmitter {
+    fn room(&self) -> usize {
+        self.0.room()
+    }
+
+    fn send(&mut self, bytes: &[u8]) {
+        for &byte in bytes {
+            if !self.0.push(byte) {
+                return;
+            }
+        }
+    }
+}
+
+/// Lets the interrupt look for something to send.
+pub fn kick() {
+    NVIC::pend(Interrupt::USART2);
+}
+
+/// Bytes received so far, bytes sent so far.
+pub fn totals() -> (u32, u32) {
+    (
+        RECEIVED.load(Ordering::Relaxed),
+        SENT.load(Ordering::Relaxed),
+    )
+}
+
+/// Bytes lost before they were read.
+pub fn overrun_bytes() -> u32 {
+    OVERRUN.load(Ordering::Relaxed)
+}
+
+/// Paces the link: so many bytes until the next call.
+pub fn allow(bytes: u32) {
+    ALLOWANCE.store(bytes, Ordering::Relaxed);
+    PACED.store(true, Ordering::Relaxed);
+}
+
+/// Sets up both UARTs (pins are the board's). `None` when called twice.
+#[allow(unsafe_code)]
+pub fn start(rcc: &RCC, log: &USART1, link: USART2) -> Option<LinkEnd> {
+    // SAFETY of all raw bits here: the values are those of RM0090, sections 7.3 and 30.6.
+    rcc.apb1enr()
+        .modify(|r, w| unsafe { w.bits(r.bits() | 1 << 17) });
+    rcc.apb2enr()
+        .modify(|r, w| unsafe { w.bits(r.bits() | 1 << 4) });
+    log.brr()
+        .write(|w| unsafe { w.bits(u32::from(baud_divisor(APB2_HZ, LOG_BAUD)) as _) });
+    log.cr1().write(|w| unsafe { w.bits((UE | TE) as _) });
+    link.brr()
+        .write(|w| unsafe { w.bits(u32::from(baud_divisor(APB1_HZ, LINK_BAUD)) as _) });
+    link.cr1()
+        .write(|w| unsafe { w.bits((UE | TE | RE | RXNEIE) as _) });
+
+    let received = cortex_m::singleton!(: Queue<u8, RECEIVE_BYTES> = Queue::new())?;
+    let transmit = cortex_m::singleton!(: Queue<u8, TRANSMIT_BYTES> = Queue::new())?;
+    let (received_in, received_out) = queue::split(received);
+    let (transmit_in, transmit_out) = queue::split(transmit);
+    let line = Line {
+        uart: link,
+        received: received_in,
+        transmit: transmit_out,
+    };
+    // SAFETY: the interrupt is enabled after this.
+    unsafe { LINE.fill(line) };
+    // SAFETY: nothing relies on this interrupt being masked.
+    unsafe { NVIC::unmask(Interrupt::USART2) };
+    Some(LinkEnd {
+        receiver: Receiver(received_out),
+        transmitter: Transmitter(transmit_in),
+    })
+}
+
+/// Sends a byte of the log where there is one and the UART takes it; whether more may be done.
+#[allow(unsafe_code)]
+pub fn pump_log(log: &USART1) -> bool {
+    if log.sr().read().bits() as u32 & TXE == 0 {
+        return false;
+    }
+    let Some(byte) = crate::log::pop() else {
+        return false;
+    };
+    // SAFETY: any byte may be sent.
+    log.dr().write(|w| unsafe { w.bits(u16::from(byte) as _) });
+    true
+}
+
+#[interrupt]
+fn USART2() {
+    // SAFETY: only this interrupt calls it.
+    #[allow(unsafe_code)]
+    let Some(line) = (unsafe { LINE.get() }) else {
+        return;
+    };
+    line.service();
+}
+
+impl Line {
+    #[allow(unsafe_code)]
+    fn service(&mut self) {
+        loop {
+            let status = self.uart.sr().read().bits() as u32;
+            if status & (RXNE | ORE) == 0 {
+                break;
+            }
+            // Reading the data after the status clears both flags.
+            let byte = self.uart.dr().read().bits() as u8;
+            if status & ORE != 0 {
+                add(&OVERRUN, 1);
+            }
+            if status & RXNE != 0 {
+                if !self.received.push(byte) {
+                    add(&OVERRUN, 1);
+                }
+                add(&RECEIVED, 1);
+            }
+        }
+        while self.uart.sr().read().bits() as u32 & TXE != 0 && allowed() {
+            let Some(byte) = self.transmit.pop() else {
+                break;
+            };
+            // SAFETY: any byte may be sent.
+            self.uart
+                .dr()
+                .write(|w| unsafe { w.bits(u16::from(byte) as _) });
+            add(&SENT, 1);
+            if PACED.load(Ordering::Relaxed) {
+                let left = ALLOWANCE.load(Ordering::Relaxed);
+                ALLOWANCE.store(left.saturating_sub(1), Ordering::Relaxed);
+            }
+        }
+        let more = self.transmit.ready() && allowed();
+        self.uart.cr1().modify(|r, w| {
+            let bits = r.bits() as u32;
+            let bits = if more { bits | TXEIE } else { bits & !TXEIE };
+            // SAFETY: one bit changes, to a value it may have.
+            unsafe { w.bits(bits as _) }
+        });
+    }
+}
+
+fn allowed() -> bool {
+    !PACED.load(Ordering::Relaxed) || ALLOWANCE.load(Ordering::Relaxed) > 0
+}
+
+/// Adds to a counter that only one context writes.
+fn add(counter: &AtomicU32, amount: u32) {
+    let sum = counter.load(Ordering::Relaxed).wrapping_add(amount);
+    counter.store(sum, Ordering::Relaxed);
+}

@@ -1,0 +1,123 @@
+//! The true quarter car: the simulator's plant on patches of road, behind an actuator with limits.
+
+use std::collections::VecDeque;
+
+use super::scenario::{Actuator, GRAVITY_M_S2, Road, SAMPLE_TIME_S, STEPS_A_SAMPLE, Scenario};
+use crate::simulate::{Contact, Plant, PlantEffect, PlantParameters, PlantState, RigLaw};
+use muslip::law::TyreLaw;
+
+/// The road's friction over that of its first patch, which is the plant's own law.
+struct Patches(Road);
+
+impl PlantEffect for Patches {
+    fn friction_factor(&self, contact: &Contact) -> f64 {
+        if self.0.patches.len() < 2 {
+            return 1.0;
+        }
+        let (first, here) = (self.0.law_at(0.0), self.0.law_at(contact.distance_m));
+        if first == here {
+            return 1.0;
+        }
+        // Both are zero at zero slip; their slopes there are the limit of the quotient.
+        if contact.slip_ratio.abs() < 1e-9 {
+            here.slip_derivative(0.0) / first.slip_derivative(0.0)
+        } else {
+            here.friction(contact.slip_ratio) / first.friction(contact.slip_ratio)
+        }
+    }
+}
+
+/// What is true at an instant.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Truth {
+    /// Time in s.
+    pub time_s: f64,
+    /// Distance in m.
+    pub distance_m: f64,
+    /// Wheel speed in rad/s.
+    pub wheel_speed_rad_s: f64,
+    /// Vehicle speed in m/s.
+    pub vehicle_speed_m_s: f64,
+    /// Slip; 0 at standstill.
+    pub slip_ratio: f64,
+    /// Friction; 0 at standstill.
+    pub friction: f64,
+    /// Brake torque in N m.
+    pub brake_torque_nm: f64,
+}
+
+/// The quarter car in motion.
+pub struct Car {
+    plant: Plant,
+    actuator: Actuator,
+    normal_force_n: f64,
+    brake_torque_nm: f64,
+    waiting: VecDeque<f64>,
+}
+
+impl Car {
+    /// Rolling freely, the brake open.
+    pub fn new(scenario: &Scenario) -> Self {
+        let parameters = PlantParameters {
+            radius_m: scenario.radius_m,
+            inertia_kg_m2: scenario.inertia_kg_m2,
+            mass_kg: scenario.mass_kg,
+            coasting: true,
+            law: RigLaw::Burckhardt(scenario.road.law_at(0.0)),
+        };
+        let mut plant = Plant::rolling(parameters, scenario.from_m_s);
+        plant.add_effect(Box::new(Patches(scenario.road.clone())));
+        Self {
+            plant,
+            actuator: scenario.actuator,
+            normal_force_n: scenario.mass_kg * GRAVITY_M_S2,
+            brake_torque_nm: 0.0,
+            waiting: std::iter::repeat_n(0.0, scenario.actuator.dead_samples).collect(),
+        }
+    }
+
+    /// What is true now.
+    pub fn truth(&self) -> Truth {
+        let PlantState {
+            time_s,
+            wheel_speed_rad_s,
+            vehicle_speed_m_s,
+            distance_m,
+            ..
+        } = self.plant.state();
+        let contact = self.plant.contact(self.normal_force_n);
+        Truth {
+            time_s,
+            distance_m,
+            wheel_speed_rad_s,
+            vehicle_speed_m_s,
+            slip_ratio: contact.slip_ratio,
+            friction: self.plant.drag_n(&contact) / self.normal_force_n,
+            brake_torque_nm: self.brake_torque_nm,
+        }
+    }
+
+    /// One step of the integration, the torque on its way to a demand in N m.
+    pub fn step(&mut self, demand_nm: f64) {
+        let dt = SAMPLE_TIME_S / f64::from(STEPS_A_SAMPLE);
+        let reach = self.actuator.maximum_rate_nm_s * dt;
+        let before = self.brake_torque_nm;
+        let demand = demand_nm.clamp(0.0, self.actuator.maximum_torque_nm);
+        self.brake_torque_nm = demand.clamp(before - reach, before + reach);
+        self.plant.step(
+            dt,
+            0.5 * (before + self.brake_torque_nm),
+            self.normal_force_n,
+        );
+    }
+
+    /// One sample under a demand in N m, which acts after the dead time; `watch` sees every step's end.
+    pub fn sample(&mut self, demand_nm: f64, mut watch: impl FnMut(&Truth)) {
+        self.waiting.push_back(demand_nm);
+        let acting = self.waiting.pop_front().unwrap_or(demand_nm);
+        for _ in 0..STEPS_A_SAMPLE {
+            self.step(acting);
+            watch(&self.truth());
+        }
+    }
+}

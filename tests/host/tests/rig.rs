@@ -1,0 +1,144 @@
+//! `muslip rig` on a simulated rig behind a socket: the controller that is flashed, natively.
+
+mod common;
+
+use std::net::TcpListener;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread::JoinHandle;
+
+use common::{RIG, Scratch};
+use muslip_record::Parameters;
+use pil::native::Native;
+use pil::rig::{Rig, Trouble};
+
+/// A rig at 20 m/s, twice as fast as a real one.
+struct Server {
+    address: String,
+    stop: Arc<AtomicBool>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl Server {
+    fn start(trouble: Trouble) -> Self {
+        let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+        let address = format!("tcp:{}", listener.local_addr().unwrap());
+        let stop = Arc::new(AtomicBool::new(false));
+        let stopped = Arc::clone(&stop);
+        let thread = std::thread::spawn(move || {
+            let mut target = Native::new().unwrap();
+            let mut rig = Rig::rolling("rudd:0.85,0.14", 20.0, 1, &Parameters::default()).unwrap();
+            pil::serve::settle(&mut target, &mut rig).unwrap();
+            rig.trouble = trouble;
+            // One client after the other on the same controller.
+            while let Ok((client, _)) = listener.accept() {
+                if stopped.load(Ordering::Relaxed) {
+                    return;
+                }
+                pil::serve::serve(&mut target, &mut rig, client, 2.0, &stopped).unwrap();
+            }
+        });
+        Self {
+            address,
+            stop,
+            thread: Some(thread),
+        }
+    }
+}
+
+impl Drop for Server {
+    fn drop(&mut self) {
+        self.stop.store(true, Ordering::Relaxed);
+        // Wakes the accept.
+        let _ = std::net::TcpStream::connect(self.address.trim_start_matches("tcp:"));
+        if let Some(thread) = self.thread.take() {
+            let _ = thread.join();
+        }
+    }
+}
+
+#[test]
+fn a_ramp_is_recorded_and_the_recording_goes_straight_into_the_estimate() {
+    let server = Server::start(Trouble::default());
+    let scratch = Scratch::with_rig(RIG);
+    let port = server.address.as_str();
+    let status = scratch.output(&["rig", "--port", port, "status"]);
+    assert!(
+        status.contains("Idle") && status.contains("emulated"),
+        "{status}"
+    );
+    let said = scratch.output(&[
+        "rig", "--port", port, "run", "--ramp", "0.8", "--cool", "0.2", "--out", "run.csv",
+    ]);
+    assert!(
+        said.contains("peak friction 0.8") && said.contains(" 0 samples missing"),
+        "{said}"
+    );
+    let text = scratch.read("run.csv");
+    assert!(text.lines().count() > 800, "{}", text.lines().count());
+    assert!(text.contains("brake_demand"));
+    let estimate = scratch.output(&[
+        "estimate",
+        "--rig",
+        "rig.toml",
+        "--range",
+        "automotive",
+        "run.csv",
+    ]);
+    assert!(estimate.contains("0.8"), "{estimate}");
+}
+
+#[test]
+fn parameters_are_printed_set_and_refused_by_name() {
+    let server = Server::start(Trouble::default());
+    let scratch = Scratch::new();
+    let port = server.address.as_str();
+    let printed = scratch.output(&["rig", "--port", port, "parameters"]);
+    assert!(printed.contains("newton_per_code"), "{printed}");
+    scratch.write(
+        "p.toml",
+        printed.replace("friction_std = 0.03", "friction_std = -0.03"),
+    );
+    let told = scratch.complaint(&["rig", "--port", port, "parameters", "--set", "p.toml"]);
+    assert!(
+        told.contains("estimator.friction_std is out of range"),
+        "{told}"
+    );
+}
+
+#[test]
+fn an_interlock_that_stands_is_named_and_nothing_is_recorded() {
+    let server = Server::start(Trouble {
+        emergency_stop: true,
+        ..Trouble::default()
+    });
+    let scratch = Scratch::new();
+    let told = scratch.complaint(&[
+        "rig",
+        "--port",
+        &server.address,
+        "run",
+        "--ramp",
+        "0.8",
+        "--out",
+        "run.csv",
+    ]);
+    assert!(
+        told.contains("error: the rig refuses to arm: interlock EmergencyStop"),
+        "{told}"
+    );
+    assert!(!scratch.path("run.csv").exists());
+}
+
+#[test]
+fn a_port_that_is_not_there_is_one_line() {
+    let scratch = Scratch::new();
+    for port in [
+        "/dev/no-such-port",
+        "tcp:127.0.0.1:1",
+        "unix:/no/such/socket",
+    ] {
+        let told = scratch.complaint(&["rig", "--port", port, "status"]);
+        assert!(told.starts_with(&format!("error: {port}: ")), "{told}");
+    }
+}

@@ -1,0 +1,90 @@
+//! The controller natively: what the image must equal.
+
+use std::collections::VecDeque;
+
+use anyhow::{Result, anyhow};
+use muslip_control::board::{Actuators, NotStored};
+use muslip_control::brake::BrakeOutput;
+use muslip_control::controller::{Controller, Identity};
+use muslip_control::link::Transmit;
+use muslip_record::Parameters;
+
+use crate::target::{Input, Output, Target};
+
+/// Bytes that the image's transmit queue holds.
+const QUEUE_BYTES: usize = 2047;
+
+/// Instructions from one sample to the next at 168 MHz.
+const CYCLES_PER_SAMPLE: u32 = 168_000;
+
+/// The controller on a board of memory.
+pub struct Native {
+    controller: Controller,
+    transmit: Queue,
+}
+
+#[derive(Default)]
+struct Queue(VecDeque<u8>);
+
+impl Transmit for Queue {
+    fn room(&self) -> usize {
+        QUEUE_BYTES - self.0.len()
+    }
+
+    fn send(&mut self, bytes: &[u8]) {
+        self.0.extend(bytes);
+    }
+}
+
+/// As in the emulator: nothing can be stored.
+struct NoStore;
+
+impl Actuators for NoStore {
+    fn actuate(&mut self, _: BrakeOutput) {}
+    fn feed_watchdog(&mut self) {}
+    fn store(&mut self, _: &Parameters) -> Result<(), NotStored> {
+        Err(NotStored)
+    }
+}
+
+impl Native {
+    /// A controller as the image starts in the emulator.
+    ///
+    /// # Errors
+    /// The default parameters are refused.
+    pub fn new() -> Result<Self> {
+        let identity = Identity {
+            core_clock_hz: 168_000_000,
+            emulated: true,
+            watchdog_reset: false,
+            slow_clock: false,
+            stored: false,
+        };
+        let controller = Controller::new(&Parameters::default(), identity)
+            .map_err(|error| anyhow!("default parameters: {error:?}"))?;
+        Ok(Self {
+            controller,
+            transmit: Queue::default(),
+        })
+    }
+}
+
+impl Target for Native {
+    fn sample(&mut self, input: &Input<'_>) -> Result<Output> {
+        let brake = self.controller.control(&input.raw);
+        let mut incoming = input.link.iter().copied();
+        self.controller
+            .communicate(|| incoming.next(), &mut self.transmit, &mut NoStore);
+        // What the image finds out by counting.
+        if input.burn > CYCLES_PER_SAMPLE {
+            self.controller.overran();
+        }
+        let sent = usize::from(input.room).min(self.transmit.0.len());
+        Ok(Output {
+            brake,
+            link: self.transmit.0.drain(..sent).collect(),
+            instructions: [0; 3],
+            stack_bytes: 0,
+        })
+    }
+}

@@ -1,0 +1,79 @@
+//! A simulated rig with its controller behind a socket, in real time: for `muslip rig`, without a rig.
+
+use std::io::{ErrorKind, Read, Write};
+use std::net::TcpStream;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+use anyhow::Result;
+use muslip_control::brake::BrakeOutput;
+
+use crate::bench::WIRE_BYTES;
+use crate::rig::Rig;
+use crate::target::{Input, Target};
+
+/// Lets a rig that is at speed from nothing run until the speed meters have settled.
+///
+/// # Errors
+/// The target is gone.
+pub fn settle(target: &mut impl Target, rig: &mut Rig) -> Result<()> {
+    for _ in 0..100 {
+        target.sample(&Input {
+            raw: rig.sample(BrakeOutput::DUMPED),
+            link: &[],
+            room: WIRE_BYTES,
+            burn: 0,
+        })?;
+    }
+    Ok(())
+}
+
+/// Samples for a client until it leaves or `stop` is set; `speed` is simulated over real time.
+///
+/// # Errors
+/// The target is gone.
+pub fn serve(
+    target: &mut impl Target,
+    rig: &mut Rig,
+    mut client: TcpStream,
+    speed: f64,
+    stop: &AtomicBool,
+) -> Result<()> {
+    client.set_nodelay(true)?;
+    client.set_nonblocking(true)?;
+    let start = Instant::now();
+    let mut brake = BrakeOutput::DUMPED;
+    let mut samples = 0_u64;
+    let mut unsent = Vec::new();
+    while !stop.load(Ordering::Relaxed) {
+        let due = Duration::from_secs_f64(samples as f64 * 1e-3 / speed);
+        if let Some(wait) = due.checked_sub(start.elapsed()) {
+            std::thread::sleep(wait);
+        }
+        samples += 1;
+        // What the wire brings in a sample.
+        let mut arrived = [0; WIRE_BYTES as usize];
+        let count = match client.read(&mut arrived) {
+            Ok(0) => return Ok(()),
+            Ok(count) => count,
+            Err(error) if error.kind() == ErrorKind::WouldBlock => 0,
+            Err(_) => return Ok(()),
+        };
+        let output = target.sample(&Input {
+            raw: rig.sample(brake),
+            link: arrived.get(..count).unwrap_or_default(),
+            room: WIRE_BYTES,
+            burn: 0,
+        })?;
+        brake = output.brake;
+        unsent.extend_from_slice(&output.link);
+        match client.write(&unsent) {
+            Ok(count) => {
+                unsent.drain(..count);
+            }
+            Err(error) if error.kind() == ErrorKind::WouldBlock => {}
+            Err(_) => return Ok(()),
+        }
+    }
+    Ok(())
+}
