@@ -323,9 +323,7 @@ impl Outcome<'_> {
     }
 
     fn unexplained(&self) -> Vec<Unexplained> {
-        let mut all: Vec<Unexplained> = self
-            .tyre
-            .map_or_else(Vec::new, |stage| Self::unexplained_tyre(stage));
+        let mut all: Vec<Unexplained> = self.tyre.map_or_else(Vec::new, Self::unexplained_tyre);
         if let Some(stage) = self.dynamics {
             let explained =
                 (stage.search.base.fitted.loss - stage.search.chosen.fitted.loss).max(0.0);
