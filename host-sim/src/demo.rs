@@ -44,3 +44,17 @@ pub fn true_peak() -> Peak<f64> {
         |law| law.peak(),
     )
 }
+
+/// The rig file of the campaign with a concealed effect.
+pub const CONCEALED_RIG: &[u8] = include_bytes!("../demo/concealed/rig.toml");
+/// Names and contents of its recordings.
+pub const CONCEALED_RUNS: [(&str, &[u8]); 4] = [
+    ("run1.csv", include_bytes!("../demo/concealed/run1.csv")),
+    ("run2.csv", include_bytes!("../demo/concealed/run2.csv")),
+    ("run3.csv", include_bytes!("../demo/concealed/run3.csv")),
+    ("run4.csv", include_bytes!("../demo/concealed/run4.csv")),
+];
+/// The mechanism that was concealed in them, in the vocabulary's word.
+pub const CONCEALED: &str = "force_delay";
+/// How late the drag channel truly reports in them, in seconds.
+pub const CONCEALED_DELAY_S: f64 = 0.012_622_8;

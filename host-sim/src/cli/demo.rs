@@ -1,23 +1,27 @@
 //! `muslip demo`.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 use muslip::filter::mu_slip::Range;
+use muslip_diagnose::ablation::Ablation;
+use muslip_diagnose::outcome::Diagnosis;
 
 use super::Failure;
 use super::estimate::{Job, tell};
 use super::terminal::Terminal;
 use crate::demo;
+use crate::diagnose::summary::summary;
+use crate::diagnose::{job, load};
 use crate::estimate::{EstimateOptions, EstimatorKind};
 use crate::output::{create_folder, write_file};
 use crate::wording::estimate_sentence;
 
-/// Show the main job on a bundled recording: print the estimate, write a report with plots.
+/// Show both main jobs on bundled recordings: estimate a curve, find a concealed effect; write reports with plots.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  muslip demo\n  muslip demo --out somewhere")]
 pub(super) struct Arguments {
-    /// Folder for the recording, the rig file, the trace and the report.
+    /// Folder for the recordings, the rig files, the trace and the reports.
     #[arg(long, value_name = "FOLDER", default_value = "muslip-demo")]
     out: PathBuf,
 }
@@ -66,5 +70,90 @@ pub(super) fn run(arguments: &Arguments, terminal: &mut Terminal) -> Result<(), 
         "  muslip estimate --rig {} --range automotive --report report.html {}",
         rig.display(),
         recording.display()
-    ))
+    ))?;
+    find_concealed(folder, terminal)
+}
+
+/// Diagnoses the bundled campaign and only then opens what was concealed in it.
+fn find_concealed(folder: &Path, terminal: &mut Terminal) -> Result<(), Failure> {
+    let campaign = folder.join("concealed");
+    let found = folder.join("found");
+    create_folder(&campaign)?;
+    let rig = campaign.join("rig.toml");
+    write_file(&rig, demo::CONCEALED_RIG)?;
+    let mut recordings = Vec::with_capacity(demo::CONCEALED_RUNS.len());
+    for (name, contents) in demo::CONCEALED_RUNS {
+        let path = campaign.join(name);
+        write_file(&path, contents)?;
+        recordings.push(path);
+    }
+    job::prepare_folder(&found)?;
+    let loaded = load::campaign(&rig, &recordings, &|_| {})?;
+    let diagnosis = job::run(loaded, Ablation::default(), &|_, _| {});
+    let shown: Vec<String> = recordings
+        .iter()
+        .map(|path| path.display().to_string())
+        .collect();
+    let command = format!(
+        "muslip diagnose --rig {} {}",
+        rig.display(),
+        shown.join(" ")
+    );
+    job::write(&found, &diagnosis, &command)?;
+    terminal.line("")?;
+    terminal.line("Four recordings of another rig, of other physics than the simulation: one effect was concealed in")?;
+    terminal.line("them. What the simulation leaves out of them:")?;
+    terminal.line("")?;
+    let summary = summary(&diagnosis, &found);
+    for line in &summary.verdict {
+        terminal.verdict(line, summary.good)?;
+    }
+    for line in &summary.lines {
+        terminal.line(line)?;
+    }
+    terminal.line("")?;
+    terminal.paragraph(&opened(&diagnosis))?;
+    terminal.line("")?;
+    terminal.line(&format!(
+        "Before and after: {}",
+        found.join("report.html").display()
+    ))?;
+    terminal.line("The same by hand:")?;
+    terminal.line(&format!("  {command} --out found"))
+}
+
+/// The concealed truth beside what was found.
+fn opened(diagnosis: &Diagnosis) -> String {
+    let found: Vec<String> = diagnosis
+        .mechanisms
+        .iter()
+        .map(|named| {
+            let figures: Vec<String> = named
+                .parameters
+                .iter()
+                .map(|figure| {
+                    if figure.unit == "s" {
+                        let (value, std) = (1e3 * figure.value, 1e3 * figure.std);
+                        format!(" {value:.1} \u{b1} {std:.1} ms")
+                    } else {
+                        format!(
+                            " {:.3} \u{b1} {:.3} {}",
+                            figure.value, figure.std, figure.unit
+                        )
+                    }
+                })
+                .collect();
+            format!("{}{}", named.id, figures.join(","))
+        })
+        .collect();
+    let found = if found.is_empty() {
+        "nothing".to_owned()
+    } else {
+        found.join("; ")
+    };
+    format!(
+        "The truth, opened now: concealed: {} {:.1} ms; found: {found}.",
+        demo::CONCEALED,
+        1e3 * demo::CONCEALED_DELAY_S
+    )
 }
