@@ -76,7 +76,11 @@ fn the_demo_writes_its_files_and_says_where_and_how() {
     let report = scratch.read("muslip-demo/report.html");
     assert!(report.contains("Friction peaks at") && report.contains("<svg"));
     assert!(scratch.read("muslip-demo/trace.csv").lines().count() > 1000);
-    assert!(scratch.read("muslip-demo/found/report.html").contains("<svg"));
+    assert!(
+        scratch
+            .read("muslip-demo/found/report.html")
+            .contains("<svg")
+    );
     // The command that it prints works as printed.
     let words = scratch.output(&["demo"]);
     let command = words
