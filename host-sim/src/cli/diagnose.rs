@@ -15,7 +15,7 @@ use crate::diagnose::summary::summary;
 
 /// Find what the simulation leaves out of recordings: where, which mechanism, how large, how sure.
 ///
-/// Writes diagnosis.json, model.toml (the repaired model: see `predict` and `simulate --model`) and
+/// Writes diagnosis.json, model.toml (the repaired model: see `predict` and `estimate --model`) and
 /// report.html into a folder, all together at the end. Give several recordings of one rig: some are kept
 /// back to prove the repair on. Faults of the data are no reason to stop: they are listed, and the rest
 /// is used.
