@@ -7,6 +7,7 @@ use std::path::PathBuf;
 use anyhow::{Context, Result, bail, ensure};
 use object::{Object, ObjectSection, ObjectSymbol, SectionKind};
 
+use crate::figures::{figures, replaced_between};
 use crate::setup;
 use crate::step::{cargo, command, root, run, step};
 
@@ -139,18 +140,6 @@ impl Image {
         image.stack_bytes = stack[1] - stack[0];
         Ok(image)
     }
-}
-
-/// Lines of `name = number`.
-fn figures(text: &str) -> Result<BTreeMap<String, u64>> {
-    text.lines()
-        .map(|line| line.split('#').next().unwrap_or("").trim())
-        .filter(|line| !line.is_empty())
-        .map(|line| {
-            let (name, value) = line.split_once('=').context("no = in a line of figures")?;
-            Ok((name.trim().to_owned(), value.trim().parse()?))
-        })
-        .collect()
 }
 
 fn budget(budgets: &BTreeMap<String, u64>, name: &str) -> Result<u64> {
@@ -298,12 +287,7 @@ fn check_runs(measured: &BTreeMap<String, u64>) -> Result<String> {
 fn write_table(table: &str) -> Result<()> {
     let path = root().join("README.md");
     let text = fs::read_to_string(&path)?;
-    let [begin, end] = TABLE;
-    let (before, rest) = text.split_once(begin).context("README.md has no table")?;
-    let (_, after) = rest
-        .split_once(end)
-        .context("README.md's table has no end")?;
-    fs::write(path, format!("{before}{begin}\n{table}{end}{after}"))?;
+    fs::write(path, replaced_between(&text, TABLE, table)?)?;
     Ok(())
 }
 
@@ -333,18 +317,4 @@ pub fn flash() -> Result<()> {
         "reset",
         command("probe-rs", &["reset", "--chip", "STM32F405RGTx"]),
     )
-}
-
-#[cfg(test)]
-mod tests {
-    use super::figures;
-
-    #[test]
-    fn figures_are_read_without_their_comments() {
-        let read = figures("# words\nflash_bytes = 98304  # more\n\nram = 1\n").unwrap();
-        assert_eq!(read.len(), 2);
-        assert_eq!(read["flash_bytes"], 98_304);
-        assert!(figures("flash_bytes 3").is_err());
-        assert!(figures("flash_bytes = x").is_err());
-    }
 }

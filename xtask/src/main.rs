@@ -3,8 +3,8 @@
 
 mod check;
 mod cycles;
+mod figures;
 mod firmware;
-mod pipeline;
 mod setup;
 mod step;
 mod test;
@@ -47,8 +47,14 @@ enum Command {
     /// What one update of each filter costs on a Cortex-M4F: instructions in QEMU, modelled cycles.
     Cycles {
         /// Print a JSON list and nothing else.
-        #[arg(long)]
+        #[arg(long, conflicts_with_all = ["write", "check"])]
         json: bool,
+        /// Write the table into docs/estimators.md.
+        #[arg(long, conflicts_with = "check")]
+        write: bool,
+        /// Only hold instruction counts against .ci/instructions.toml, as the tests do.
+        #[arg(long)]
+        check: bool,
     },
     /// Build, check, and put the image onto a chip by probe-rs.
     Flash,
@@ -83,7 +89,8 @@ fn main() -> anyhow::Result<()> {
                 None => firmware::pil(&arguments, write),
             }
         }
-        Command::Cycles { json } => cycles::run_all(json),
+        Command::Cycles { check: true, .. } => cycles::check(),
+        Command::Cycles { json, write, .. } => cycles::run_all(json, write),
         Command::Flash => firmware::flash(),
         Command::Trial { arguments } => trial::play(&arguments),
     }

@@ -5,6 +5,7 @@ use std::process::{Command, Stdio};
 
 use anyhow::{Context, Result, bail};
 
+use crate::cycles;
 use crate::firmware;
 use crate::setup::{self, TARGETS};
 use crate::step::{cargo, run, step};
@@ -84,6 +85,8 @@ pub fn run_all() -> Result<()> {
             )?;
         }
     }
+
+    cycles::check()?;
 
     firmware::test()?;
 

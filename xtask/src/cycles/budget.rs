@@ -1,0 +1,83 @@
+//! The instruction counts that the filters are held to.
+
+use std::collections::BTreeMap;
+use std::fs;
+
+use anyhow::{Result, bail, ensure};
+
+use crate::figures::figures;
+use crate::step::root;
+
+const BUDGETS: &str = ".ci/instructions.toml";
+
+/// Counts against the file of budgets: equal, or an error that names all that are not.
+///
+/// Counts are exact, so that a budget that is too wide is as wrong as one that is exceeded: it would hide
+/// the next change.
+pub fn check(counts: &[(String, u64)]) -> Result<()> {
+    let budgets = figures(&fs::read_to_string(root().join(BUDGETS))?)?;
+    compare(counts, &budgets)?;
+    for (name, count) in counts {
+        println!("{name}: {count} instructions, as budgeted");
+    }
+    // A check that never fails proves nothing: none of these may pass it.
+    for (name, _) in counts {
+        for wrong in tampered(&budgets, name) {
+            ensure!(
+                compare(counts, &wrong).is_err(),
+                "the check does not see a wrong budget of {name}"
+            );
+        }
+    }
+    Ok(())
+}
+
+/// The budgets with one of them an instruction lower, an instruction higher, or missing.
+fn tampered(budgets: &BTreeMap<String, u64>, name: &str) -> [BTreeMap<String, u64>; 3] {
+    let mut all = [budgets.clone(), budgets.clone(), budgets.clone()];
+    let [lower, higher, missing] = &mut all;
+    lower.entry(name.to_owned()).and_modify(|count| *count -= 1);
+    higher
+        .entry(name.to_owned())
+        .and_modify(|count| *count += 1);
+    missing.remove(name);
+    all
+}
+
+fn compare(counts: &[(String, u64)], budgets: &BTreeMap<String, u64>) -> Result<()> {
+    let off: Vec<String> = counts
+        .iter()
+        .filter_map(|(name, count)| match budgets.get(name) {
+            Some(budget) if budget == count => None,
+            Some(budget) => Some(format!("{name} = {count}  # and not {budget}")),
+            None => Some(format!("{name} = {count}  # has no budget")),
+        })
+        .collect();
+    if !off.is_empty() {
+        bail!(
+            "instructions of 41 updates differ from {BUDGETS}; a commit that changes a budget says why:\n{}",
+            off.join("\n")
+        );
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{compare, tampered};
+    use crate::figures::figures;
+
+    #[test]
+    fn a_count_that_is_not_its_budget_is_named() {
+        let budgets = figures("article = 2624\nefficient = 20000\n").unwrap();
+        let counts = [
+            ("article".to_owned(), 2624),
+            ("efficient".to_owned(), 20_000),
+        ];
+        compare(&counts, &budgets).unwrap();
+        for wrong in tampered(&budgets, "efficient") {
+            let message = compare(&counts, &wrong).unwrap_err().to_string();
+            assert!(message.contains("efficient = 20000") && !message.contains("article = "));
+        }
+    }
+}
