@@ -52,7 +52,7 @@ enum Command {
         /// Write the table into docs/estimators.md.
         #[arg(long, conflicts_with = "check")]
         write: bool,
-        /// Only hold instruction counts against .ci/instructions.toml, as the tests do.
+        /// Only hold instruction counts against .ci/cycles.toml, as the tests do.
         #[arg(long)]
         check: bool,
     },

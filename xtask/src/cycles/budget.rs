@@ -1,4 +1,4 @@
-//! The instruction counts that the filters are held to.
+//! The instruction counts, and the modelled cycles, that the filters are held to.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -8,7 +8,7 @@ use anyhow::{Result, bail, ensure};
 use crate::figures::figures;
 use crate::step::root;
 
-const BUDGETS: &str = ".ci/instructions.toml";
+const BUDGETS: &str = ".ci/cycles.toml";
 
 /// Counts against the file of budgets: equal, or an error that names all that are not.
 ///
@@ -18,7 +18,7 @@ pub fn check(counts: &[(String, u64)]) -> Result<()> {
     let budgets = figures(&fs::read_to_string(root().join(BUDGETS))?)?;
     compare(counts, &budgets)?;
     for (name, count) in counts {
-        println!("{name}: {count} instructions, as budgeted");
+        println!("{name}: {count}, as budgeted");
     }
     // A check that never fails proves nothing: none of these may pass it.
     for (name, _) in counts {
@@ -55,7 +55,7 @@ fn compare(counts: &[(String, u64)], budgets: &BTreeMap<String, u64>) -> Result<
         .collect();
     if !off.is_empty() {
         bail!(
-            "instructions of 41 updates differ from {BUDGETS}; a commit that changes a budget says why:\n{}",
+            "counts of 41 updates differ from {BUDGETS}; a commit that changes a budget says why:\n{}",
             off.join("\n")
         );
     }

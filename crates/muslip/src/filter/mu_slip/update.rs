@@ -300,32 +300,55 @@ pub fn update_unchecked<T: Real>(
         critical_slip: sp,
     } = state;
     let Covariance { p00, p01, p11 } = covariance;
-    let (ss, pp) = (slip_ratio * slip_ratio, sp * sp);
+    // The order of the lines is the compiler's order, near enough: no result is used by the next
+    // instruction, which on a Cortex-M4F costs a cycle each time (docs/design/0006). The law first.
+    let ss = slip_ratio * slip_ratio;
     let twice = slip_ratio + slip_ratio;
-    let (d, difference) = (ss + pp, ss - pp);
     let arm = twice * sp;
+    let pp = sp * sp;
+    let difference = ss - pp;
+    let twice_difference = difference + difference;
     let b = twice * difference;
-    let (dd, h0) = (d * d, arm * d);
     let h1 = mup * b;
+    let p01_h1 = h1 * p01;
+    let d = pp + ss;
+    let h0 = d * arm;
+    let b_p00 = b * p00;
+    let p01_h0 = h0 * p01;
+    let dd = d * d;
+    let p00_h0 = p00 * h0;
+    let scaled_friction = friction * dd;
+    let p11_h1 = p11 * h1;
+    let b_p11 = b * p11;
+    let both = b_p00 * b_p11;
+    let predicted = mup * h0;
     // sp² - 3 s² = -(d + 2 (s² - sp²)), and its sign is squared away.
-    let bend = d + (difference + difference);
-    let c = (mup * arm) * bend;
-    let (g0, g1) = (p00 * h0 + p01 * h1, p01 * h0 + p11 * h1);
-    let noise = measurement_variance * (dd * dd) + (b * b) * (p00 * p11);
+    let bend = d + twice_difference;
+    let arm_bend = arm * bend;
+    let c = arm_bend * mup;
+    let g1 = p11_h1 + p01_h0;
+    let g0 = p01_h1 + p00_h0;
+    let signal_0 = h0 * g0;
+    let dddd = dd * dd;
+    let noise = measurement_variance * dddd;
+    let signal_1 = g1 * h1;
+    let innovation = scaled_friction - predicted;
     let cp = c * p11;
-    let scaled = dd * (noise + h0 * g0 + h1 * g1) + cp * cp;
+    let scaled = dd * (((signal_1 + both) + signal_0) + noise) + cp * cp;
     let gain = dd / scaled;
-    let innovation = friction * dd - mup * h0;
-    let (k0, k1) = (g0 * gain, g1 * gain);
+    let (k1, k0) = (gain * g1, g0 * gain);
+    let move_1 = k1 * innovation;
+    let (less_01, less_11, less_00) = (g1 * k0, k1 * g1, k0 * g0);
+    let move_0 = innovation * k0;
     (
         State {
-            peak_friction: mup + k0 * innovation,
-            critical_slip: sp + k1 * innovation,
+            peak_friction: mup + move_0,
+            critical_slip: sp + move_1,
         },
         Covariance {
-            p00: p00 - k0 * g0,
-            p01: p01 - k0 * g1,
-            p11: p11 - k1 * g1,
+            p00: p00 - less_00,
+            p01: p01 - less_01,
+            p11: p11 - less_11,
         },
     )
 }
