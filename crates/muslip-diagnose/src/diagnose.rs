@@ -15,11 +15,12 @@ use crate::locate::{intervals, regions};
 use crate::looked::looked_for;
 use crate::mechanism::{Balance, Id, Reported};
 use crate::model::Model;
-use crate::noise::{loss, robust_sigma, whiteness};
+use crate::noise::robust_sigma;
 use crate::outcome::{
     Alternative, BeforeAfter, ChannelNoise, Diagnosis, Estimate, Evidence, Fault, Figure, Fit,
     Interval, NamedMechanism, Recording, Region, Role, Score, Trace, Unexplained, Verdict,
 };
+use crate::proof::{self, Likelihood, score};
 use crate::repaired::{Domain, KnownRecording, NoiseModel, Repaired};
 use crate::separating::separating_test;
 use crate::split::Split;
@@ -656,14 +657,8 @@ impl Outcome<'_> {
     fn scores(&self) -> Fit {
         match (self.tyre, self.dynamics) {
             (Some(stage), _) => {
-                let of = |proof: bool| {
-                    let joint = self.tyre_joint(stage, proof);
-                    BeforeAfter {
-                        before: self.tyre_score(&joint.parts[0], &|run| stage.base(self.data, run)),
-                        after: self
-                            .tyre_score(&joint.parts[0], &|run| stage.repaired(self.data, run)),
-                    }
-                };
+                let of =
+                    |kept: bool| proof::of_stage(&self.tyre_joint(stage, kept).parts[0], stage);
                 Fit {
                     fit: of(false),
                     holdout: of(true),
@@ -684,33 +679,6 @@ impl Outcome<'_> {
             }
             (None, None) => Fit::default(),
         }
-    }
-
-    fn tyre_score(&self, problem: &Problem<'_>, predict: &dyn Fn(usize) -> Vec<f64>) -> Score {
-        let mut innovations = Vec::new();
-        let (mut square, mut count, mut log_scale) = (0.0, 0.0, 0.0);
-        for &run in problem.runs {
-            let residual: Vec<f64> = predict(run)
-                .iter()
-                .zip(&self.data.series[run].drag)
-                .map(|(f, y)| y - f)
-                .collect();
-            for segment in problem.segments(run) {
-                for k in segment.clone() {
-                    square += residual[k] * residual[k];
-                    log_scale += problem.noise.scale[run][k].ln();
-                    count += 1.0;
-                }
-            }
-            innovations.extend(problem.whiten(&residual, run));
-        }
-        score(
-            square,
-            count,
-            log_scale,
-            problem.noise.whitener.sigma,
-            &innovations,
-        )
     }
 
     fn dynamics_score(&self, joint: &Joint<'_>, model: &Model) -> Score {
@@ -882,6 +850,8 @@ impl Outcome<'_> {
         }
         Repaired {
             schema: "muslip.model/1".to_owned(),
+            averaged: data.averaged,
+            proof_by_blocks: self.split.by_block,
             rig: data.rig.clone(),
             base_alone,
             base,
@@ -894,6 +864,15 @@ impl Outcome<'_> {
                 sigma_n: finite(sigma),
                 share_of_force: 0.0,
                 step_s: Some(finite(data.context.dt)),
+                channels: self
+                    .noise()
+                    .into_iter()
+                    .map(|(name, noise)| (name, noise.sigma))
+                    .collect(),
+                likelihood: self.tyre.and_then(|stage| {
+                    let size = stage.noise.size?;
+                    Some(Likelihood::new(size, &stage.noise.whitener))
+                }),
             },
             domain,
             context: data.context.clone(),
@@ -904,27 +883,10 @@ impl Outcome<'_> {
                     path: s.name.clone(),
                     first_time_s: finite(s.time.first().copied().unwrap_or(0.0)),
                     samples: s.len() * data.averaged,
+                    holdout: !self.split.by_block && self.split.proof_runs.contains(&s.index),
                 })
                 .collect(),
         }
-    }
-}
-
-fn score(square: f64, count: f64, log_scale: f64, sigma: f64, innovations: &[f64]) -> Score {
-    if !(count > 0.0) {
-        return Score::default();
-    }
-    let n = innovations.len().max(1) as f64;
-    let mean_loss = innovations.iter().map(|e| loss(*e)).sum::<f64>() / n;
-    Score {
-        rmse_n: finite((square / count).sqrt()),
-        nll_per_sample: finite(
-            mean_loss
-                + 0.5 * core::f64::consts::TAU.ln()
-                + sigma.max(1e-300).ln()
-                + log_scale / count,
-        ),
-        whiteness_p: whiteness(innovations).map(finite),
     }
 }
 

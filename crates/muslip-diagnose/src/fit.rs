@@ -8,7 +8,7 @@ use nalgebra::{DMatrix, DVector};
 use crate::data::{Data, Listed, NARROW, WIDTH};
 use crate::mechanism::Balance;
 use crate::model::{Model, TYRE_BASE, tyre, vehicle, wheel};
-use crate::noise::{Whitener, loss, weight};
+use crate::noise::{NoiseSize, Whitener, loss, weight};
 use crate::number::{Dual, Number};
 
 /// Noise of one balance: a scale for each sample and one colour.
@@ -18,6 +18,8 @@ pub struct BalanceNoise {
     pub whitener: Whitener,
     /// Standard deviation of each sample before whitening, by run; in the residual's unit.
     pub scale: Vec<Vec<f64>>,
+    /// What the scale follows, once it is known (tyre balance).
+    pub size: Option<NoiseSize>,
 }
 
 /// A balance of a campaign with its noise: what a model is fitted to.

@@ -15,6 +15,7 @@
 //! | joint fit | [`fit`] |
 //! | choice | [`choose`], [`validation`], [`otherwise`], [`tyre_stage`], [`dynamics_stage`] |
 //! | remainder | [`remainder`], [`lines`], [`dynamics_remainder`] |
+//! | proof | [`proof`] |
 //! | location | [`locate`] |
 //! | how sure, and what was looked for | [`confidence`], [`separating`], [`looked`] |
 //! | what each part is worth | [`ablation`] |
@@ -47,6 +48,7 @@ pub mod omnibus;
 pub mod otherwise;
 pub mod outcome;
 pub mod prepare;
+pub mod proof;
 pub mod remainder;
 pub mod repaired;
 pub mod saturated;

@@ -3,6 +3,7 @@
 
 use core::ops::Range;
 
+use serde::{Deserialize, Serialize};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 /// Longest autoregression tried.
@@ -13,6 +14,32 @@ const MAX_BLOCK_ORDER: usize = 10;
 const CLIP: f64 = 3.5;
 /// Innovations beyond this many standard deviations count linearly (Huber 1964).
 pub const HUBER: f64 = 2.2;
+
+/// Size of the tyre residual's noise by what it depends on.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct NoiseSize {
+    /// Variance at rest in N², and the shares of the squared force and of the squared noise that slip brings
+    /// into the force.
+    pub parts: [f64; 3],
+    /// Least variance in N².
+    pub least: f64,
+    /// Standard deviation in N where the parts say nothing.
+    pub typical: f64,
+}
+
+impl NoiseSize {
+    /// Standard deviation of one sample in N, from the force and from what slip noise does to it, both in N.
+    #[must_use]
+    pub fn sigma(&self, force: f64, slip_noise: f64) -> f64 {
+        let [constant, force_share, slip_share] = self.parts;
+        let variance = constant + force_share * force.powi(2) + slip_share * slip_noise.powi(2);
+        if variance.is_finite() {
+            variance.max(self.least).sqrt()
+        } else {
+            self.typical
+        }
+    }
+}
 
 /// A stationary noise model: d = (1 − θB)/(1 − Σ aᵢBⁱ) e with white e of standard deviation `sigma`, for means d
 /// of `block` samples.

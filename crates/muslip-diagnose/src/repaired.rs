@@ -10,7 +10,8 @@ use crate::data::{Catalogue, Data};
 use crate::mechanism::{Context, Parameter};
 use crate::model::{Model, Term, tyre};
 use crate::omnibus::{Action, Levers, Variable, hat};
-use crate::prepare::prepare;
+use crate::prepare::{Series, prepare};
+use crate::proof::Likelihood;
 
 /// A mechanism with its parameters.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -59,15 +60,21 @@ pub struct Correction {
 }
 
 /// Size of the drag's noise: variance = constant² + (share · force)² and so on.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct NoiseModel {
     /// Standard deviation of one drag sample in N.
     pub sigma_n: f64,
     /// Part of it that grows with the force, as a share of the force.
     pub share_of_force: f64,
-    /// Autoregressive coefficients of its colour, at the fitted sampling step.
+    /// Sampling step in s at which its colour holds.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub step_s: Option<f64>,
+    /// Standard deviation of each channel's own noise by column, as the diagnosis found it.
+    #[serde(default)]
+    pub channels: BTreeMap<String, f64>,
+    /// Size by operating point, and colour; `None` where the tyre balance could not be fitted.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub likelihood: Option<Likelihood>,
 }
 
 /// The range of operation that the model was fitted on.
@@ -86,6 +93,9 @@ pub struct KnownRecording {
     pub first_time_s: f64,
     /// Rows, to recognise the file by.
     pub samples: usize,
+    /// Whether it was kept for the proof.
+    #[serde(default)]
+    pub holdout: bool,
 }
 
 /// A repaired model.
@@ -93,6 +103,12 @@ pub struct KnownRecording {
 pub struct Repaired {
     /// `muslip.model/1`.
     pub schema: String,
+    /// Samples that were averaged into one before anything else; 0 and 1 mean none.
+    #[serde(default)]
+    pub averaged: usize,
+    /// Whether blocks of every recording were kept for the proof instead of whole recordings.
+    #[serde(default)]
+    pub proof_by_blocks: bool,
     /// Rig as declared.
     pub rig: Rig,
     /// Base law alone, refitted: logarithms of peak friction and slip at the peak, and the input shares.
@@ -166,6 +182,9 @@ pub enum RepairedError {
     /// A value that is not finite, or a vector of the wrong length.
     #[error("{0} is not a usable value")]
     BadValue(String),
+    /// A model made where the tyre balance could not be fitted.
+    #[error("the model has no [noise.likelihood]: its tyre balance was not fitted")]
+    NoLikelihood,
 }
 
 impl Repaired {
@@ -264,6 +283,29 @@ impl Repaired {
         }
     }
 
+    /// Position of a recording among those that the model was made from, by file name, length and first time.
+    pub(crate) fn known(&self, run: &Run) -> Option<usize> {
+        let averaged = self.averaged.max(1);
+        self.recordings.iter().position(|r| {
+            (r.samples == run.len() || r.samples == run.len() * averaged)
+                && run.time_s.first().is_some_and(|t| *t == r.first_time_s)
+                && file_name(&r.path) == file_name(&run.name)
+        })
+    }
+
+    /// A campaign of one run under this model.
+    pub(crate) fn data_of(&self, series: Series, extra_names: Vec<String>) -> Data {
+        Data {
+            rig: self.rig.clone(),
+            series: vec![series],
+            context: self.context.clone(),
+            extra_names,
+            faults: Vec::new(),
+            averaged: 1,
+            catalogue: Arc::default(),
+        }
+    }
+
     /// Predicts the drag reading of a recording from its other columns.
     ///
     /// # Errors
@@ -271,15 +313,7 @@ impl Repaired {
     pub fn predict(&self, run: &Run, which: Which) -> Result<Prediction, RepairedError> {
         let mut blind = run.clone();
         blind.drag_force_n = Vec::new();
-        let index = self
-            .recordings
-            .iter()
-            .position(|r| {
-                r.samples == run.len()
-                    && run.time_s.first().is_some_and(|t| *t == r.first_time_s)
-                    && file_name(&r.path) == file_name(&run.name)
-            })
-            .unwrap_or(self.recordings.len());
+        let index = self.known(run).unwrap_or(self.recordings.len());
         let mut extra_names: Vec<String> = run.extra.iter().map(|(name, _)| name.clone()).collect();
         extra_names.sort();
         let (series, _) = prepare(
@@ -289,15 +323,7 @@ impl Repaired {
             index,
             self.context.reach_factor,
         );
-        let data = Data {
-            rig: self.rig.clone(),
-            series: vec![series],
-            context: self.context.clone(),
-            extra_names,
-            faults: Vec::new(),
-            averaged: 1,
-            catalogue: Arc::default(),
-        };
+        let data = self.data_of(series, extra_names);
         let model = self.tyre_model(&data.catalogue, which)?;
         let series = &data.series[0];
         let state = tyre(

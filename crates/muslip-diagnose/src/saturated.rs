@@ -9,7 +9,7 @@ use crate::fit::{BalanceNoise, Fitted, Problem};
 use crate::lines::{self, PLACES, phase_of, strongest};
 use crate::mechanism::Balance;
 use crate::model::Model;
-use crate::noise::{Whitener, robust_sigma};
+use crate::noise::{NoiseSize, Whitener, robust_sigma};
 use crate::omnibus::{Action, Column, Levers, Regression, Variable, group};
 
 /// Times in s by which the predicted force is held back to stand for anything the chain may do.
@@ -44,6 +44,7 @@ pub fn first_guess(data: &Data, balance: Balance) -> BalanceNoise {
             ..Whitener::unit()
         },
         scale,
+        size: None,
     }
 }
 
@@ -300,6 +301,7 @@ fn estimate_once(guessed: &Problem<'_>, fitted: &Fitted, slow: Slow) -> BalanceN
             guess.whitener.clone()
         },
         scale: guess.scale.clone(),
+        size: None,
     };
     let problem = Problem {
         data,
@@ -323,9 +325,12 @@ fn estimate_once(guessed: &Problem<'_>, fitted: &Fitted, slow: Slow) -> BalanceN
             rest = left_over(&problem, &regression, fitted, &columns);
         }
     }
-    let scale = match balance {
-        Balance::Tyre => tyre_scale(data, &problem, fitted, &rest, runs),
-        _ => guess.scale.clone(),
+    let (scale, size) = match balance {
+        Balance::Tyre => {
+            let (scale, size) = tyre_scale(data, &problem, fitted, &rest, runs);
+            (scale, Some(size))
+        }
+        _ => (guess.scale.clone(), None),
     };
     let mut joined = Vec::new();
     let mut segments = Vec::new();
@@ -377,7 +382,11 @@ fn estimate_once(guessed: &Problem<'_>, fitted: &Fitted, slow: Slow) -> BalanceN
         1.0
     };
     whitener.sigma *= excess.clamp(least, most);
-    BalanceNoise { whitener, scale }
+    BalanceNoise {
+        whitener,
+        scale,
+        size,
+    }
 }
 
 /// What is left of a residual when it is regressed on columns, the model's own parameters free alongside; by run.
@@ -482,7 +491,7 @@ fn tyre_scale(
     fitted: &Fitted,
     rest: &[Vec<f64>],
     runs: &[usize],
-) -> Vec<Vec<f64>> {
+) -> (Vec<Vec<f64>>, NoiseSize) {
     let levers = Levers::new(data, &fitted.model);
     let mut features: Vec<[f64; 3]> = Vec::new();
     let mut squares: Vec<f64> = Vec::new();
@@ -548,24 +557,22 @@ fn tyre_scale(
             }
         }
     }
-    let floor = 0.05 * typical * typical;
-    (0..data.series.len())
-        .map(|run| {
-            (0..data.series[run].len())
-                .map(|k| {
-                    let f = [
-                        1.0,
-                        levers.force[run][k].powi(2),
-                        data.series[run].slip_force_noise(k, &data.context).powi(2),
-                    ];
-                    let variance = parts[0] * f[0] + parts[1] * f[1] + parts[2] * f[2];
-                    if variance.is_finite() {
-                        variance.max(floor).sqrt()
-                    } else {
-                        typical
-                    }
-                })
+    let size = NoiseSize {
+        parts,
+        least: 0.05 * typical * typical,
+        typical,
+    };
+    let scale = data
+        .series
+        .iter()
+        .zip(&levers.force)
+        .map(|(series, force)| {
+            force
+                .iter()
+                .enumerate()
+                .map(|(k, f)| size.sigma(*f, series.slip_force_noise(k, &data.context)))
                 .collect()
         })
-        .collect()
+        .collect();
+    (scale, size)
 }

@@ -51,6 +51,22 @@ type Cut<'a> = &'a dyn Fn(usize, &[Range<usize>]) -> Vec<Range<usize>>;
 const BLOCKS: usize = 10;
 const KEPT_BLOCKS: [usize; 2] = [3, 7];
 
+/// The blocks of a run's usable stretches that are kept for the proof, or the others.
+pub(crate) fn blocks(samples: usize, segments: &[Range<usize>], proof: bool) -> Vec<Range<usize>> {
+    let kept = |k: usize| KEPT_BLOCKS.contains(&(k * BLOCKS / samples.max(1)));
+    let mut out: Vec<Range<usize>> = Vec::new();
+    for segment in segments {
+        for k in segment.clone().filter(|k| kept(*k) == proof) {
+            match out.last_mut() {
+                Some(last) if last.end == k && k != segment.start => last.end = k + 1,
+                _ => out.push(k..k + 1),
+            }
+        }
+    }
+    out.retain(|s| s.len() >= 10);
+    out
+}
+
 impl Split {
     /// Splits a campaign.
     #[must_use]
@@ -97,25 +113,8 @@ impl Split {
                 proof: whole,
             };
         }
-        let in_kept = |run: usize, k: usize| {
-            let block = k * BLOCKS / data.series[run].len().max(1);
-            KEPT_BLOCKS.contains(&block)
-        };
-        let cut = |run: usize, segments: &[Range<usize>], proof: bool| -> Vec<Range<usize>> {
-            let mut out: Vec<Range<usize>> = Vec::new();
-            for segment in segments {
-                for k in segment.clone() {
-                    if in_kept(run, k) != proof {
-                        continue;
-                    }
-                    match out.last_mut() {
-                        Some(last) if last.end == k && k != segment.start => last.end = k + 1,
-                        _ => out.push(k..k + 1),
-                    }
-                }
-            }
-            out.retain(|s| s.len() >= 10);
-            out
+        let cut = |run: usize, segments: &[Range<usize>], proof: bool| {
+            blocks(data.series[run].len(), segments, proof)
         };
         Self {
             fit_runs: usable.clone(),

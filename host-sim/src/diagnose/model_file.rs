@@ -8,7 +8,7 @@ use muslip_diagnose::data::Catalogue;
 use muslip_diagnose::mechanism::Context;
 use muslip_diagnose::model::TYRE_BASE;
 use muslip_diagnose::omnibus::Action;
-use muslip_diagnose::repaired::{Correction, Repaired, RepairedTerm};
+use muslip_diagnose::repaired::{Correction, NoiseModel, Repaired, RepairedTerm};
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
@@ -254,19 +254,7 @@ fn complaint(model: &Repaired) -> Option<Complaint> {
         .or_else(|| terms_complaint("tyre", &model.tyre, &model.context))
         .or_else(|| terms_complaint("dynamics", &model.dynamics, &model.context))
         .or_else(|| corrections_complaint(&model.corrections))
-        .or_else(|| {
-            let noise = &model.noise;
-            [
-                ("sigma_n", noise.sigma_n),
-                ("share_of_force", noise.share_of_force),
-            ]
-            .into_iter()
-            .find(|(_, value)| !(0.0..=f64::MAX).contains(value))
-            .map(|(key, value)| Complaint {
-                key: way!["noise", key],
-                what: format!("{value} is no standard deviation"),
-            })
-        })
+        .or_else(|| noise_complaint(&model.noise))
         .or_else(|| context_complaint(&model.context))
 }
 
@@ -353,6 +341,53 @@ fn terms_complaint(table: &str, terms: &[RepairedTerm], context: &Context) -> Op
                 what: format!("{} is not finite", term.parameters[at].value),
             });
         }
+    }
+    None
+}
+
+fn noise_complaint(noise: &NoiseModel) -> Option<Complaint> {
+    let size = |value: &f64| (0.0..=f64::MAX).contains(value);
+    let complain = |key: Vec<Step>, value: f64| {
+        Some(Complaint {
+            key,
+            what: format!("{value} is no standard deviation"),
+        })
+    };
+    for (key, value) in [
+        ("sigma_n", noise.sigma_n),
+        ("share_of_force", noise.share_of_force),
+    ] {
+        if !size(&value) {
+            return complain(way!["noise", key], value);
+        }
+    }
+    for (name, value) in &noise.channels {
+        if !size(value) {
+            return complain(way!["noise", "channels", name.as_str()], *value);
+        }
+    }
+    let likelihood = noise.likelihood.as_ref()?;
+    let sigma = likelihood.innovation_sigma;
+    if !(size(&sigma) && sigma > 0.0) {
+        return complain(way!["noise", "likelihood", "innovation_sigma"], sigma);
+    }
+    let parts = likelihood.size.parts;
+    let mut all = parts
+        .iter()
+        .chain([&likelihood.size.least, &likelihood.size.typical]);
+    if !all.all(size) {
+        let key = way!["noise", "likelihood", "size"];
+        return Some(Complaint {
+            key,
+            what: "a variance is negative or not finite".to_owned(),
+        });
+    }
+    if !likelihood.colour.iter().all(|a| a.is_finite()) {
+        let key = way!["noise", "likelihood", "colour"];
+        return Some(Complaint {
+            key,
+            what: "not all finite".to_owned(),
+        });
     }
     None
 }

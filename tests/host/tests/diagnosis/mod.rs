@@ -93,6 +93,8 @@ fn parameter(name: &str, value: f64, std: f64, unit: &str) -> RepairedParameter 
 pub fn repaired() -> Repaired {
     Repaired {
         schema: "muslip.model/1".into(),
+        averaged: 1,
+        proof_by_blocks: false,
         rig: rig(),
         base_alone: vec![0.82_f64.ln(), 0.141_f64.ln(), 0.0, 0.0, 0.0],
         base: vec![0.85_f64.ln(), 0.13_f64.ln(), 0.0, 0.0, 0.0],
@@ -130,6 +132,7 @@ pub fn repaired() -> Repaired {
             sigma_n: 91.3,
             share_of_force: 0.004,
             step_s: Some(0.002),
+            ..NoiseModel::default()
         },
         domain: Domain {
             ranges: BTreeMap::from([("slip".to_owned(), [-0.01, 0.9])]),
@@ -166,6 +169,7 @@ pub fn repaired() -> Repaired {
             path: "run00.csv".into(),
             first_time_s: 0.0,
             samples: 3000,
+            holdout: false,
         }],
     }
 }
