@@ -98,6 +98,31 @@ impl RigFile {
     }
 }
 
+/// The rig as a repaired model's file has it.
+pub fn of_engine(rig: &muslip_diagnose::campaign::Rig) -> RigFile {
+    RigFile {
+        wheel: Wheel {
+            radius_m: rig.radius_m,
+            inertia_kg_m2: rig.wheel_inertia_kg_m2,
+        },
+        vehicle: Vehicle {
+            mass_kg: rig.mass_kg,
+            coasting: rig.coasting,
+        },
+        brake: rig
+            .torque_per_pressure_nm_pa
+            .map(|torque_per_pressure_nm_pa| Brake {
+                torque_per_pressure_nm_pa,
+            }),
+        tyre: Tyre {
+            peak_friction: rig.peak_friction,
+            critical_slip: rig.critical_slip,
+            fixed: rig.law_fixed,
+        },
+        noise: rig.declared_noise.clone(),
+    }
+}
+
 /// The file as serde sees it: every value that is checked keeps its place.
 #[derive(Deserialize)]
 struct Written {

@@ -8,10 +8,11 @@ use serde::{Deserialize, Serialize};
 use crate::campaign::Run;
 use crate::data::Data;
 use crate::fit::Problem;
+use crate::mechanism::Context;
 use crate::noise::{NoiseSize, Whitener, loss, whiteness};
 use crate::outcome::{BeforeAfter, Score};
-use crate::prepare::prepare;
-use crate::repaired::{Repaired, RepairedError, Which};
+use crate::prepare::{Series, prepare};
+use crate::repaired::{NoiseModel, Repaired, RepairedError, Which};
 use crate::split;
 use crate::tyre_stage::TyreStage;
 
@@ -156,13 +157,17 @@ fn judged(
     Judged {
         before: residual(base),
         after: residual(repaired),
-        scale: repaired
-            .iter()
-            .enumerate()
-            .map(|(k, f)| size.sigma(*f, series.slip_force_noise(k, &data.context)))
-            .collect(),
+        scale: sizes(series, &data.context, repaired, size),
         segments,
     }
+}
+
+fn sizes(series: &Series, context: &Context, force: &[f64], size: &NoiseSize) -> Vec<f64> {
+    force
+        .iter()
+        .enumerate()
+        .map(|(k, f)| size.sigma(*f, series.slip_force_noise(k, context)))
+        .collect()
 }
 
 /// Which figures a stretch of a recording enters.
@@ -174,6 +179,25 @@ enum Kind {
 }
 
 impl Repaired {
+    /// Size of a reading's noise before colour, row by row, for the drag that the model expects of a run, in N; what
+    /// noise of the run's own speeds does to the prediction is counted in.
+    #[must_use]
+    pub fn reading_sigma(&self, run: &Run, expected_n: &[f64]) -> Vec<f64> {
+        let Some(likelihood) = &self.noise.likelihood else {
+            let NoiseModel {
+                sigma_n,
+                share_of_force,
+                ..
+            } = &self.noise;
+            return expected_n
+                .iter()
+                .map(|f| sigma_n.hypot(share_of_force * f))
+                .collect();
+        };
+        let (series, _) = prepare(&self.rig, run, &[], 0, self.context.reach_factor);
+        sizes(&series, &self.context, expected_n, &likelihood.size)
+    }
+
     /// The figures of `diagnosis.json`, worked out again from recordings: those that the model was made from, in the
     /// order of its file, give what the diagnosis says. Recordings without a drag column do not count.
     ///

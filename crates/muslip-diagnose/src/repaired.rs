@@ -283,6 +283,14 @@ impl Repaired {
         }
     }
 
+    /// The models of wheel and vehicle in the engine's own form.
+    ///
+    /// # Errors
+    /// [`RepairedError`] where the file names what this program does not know.
+    pub fn dynamics_model(&self, catalogue: &Catalogue) -> Result<Model, RepairedError> {
+        self.model_of(catalogue, &[], &self.dynamics)
+    }
+
     /// Position of a recording among those that the model was made from, by file name, length and first time.
     pub(crate) fn known(&self, run: &Run) -> Option<usize> {
         let averaged = self.averaged.max(1);

@@ -6,6 +6,7 @@ use muslip_diagnose::repaired::{Prediction, RepairedError, Which};
 
 use super::load::Loaded;
 use super::model_file::ModelFile;
+use crate::recording::push_exact;
 
 /// Predicts a recording, row by row of the file.
 ///
@@ -40,30 +41,15 @@ pub fn write(mut sink: impl Write, prediction: &Prediction) -> io::Result<()> {
     ];
     for (row, &time) in prediction.time_s.iter().enumerate() {
         line.clear();
-        push(&mut line, time);
+        push_exact(&mut line, time);
         for column in columns {
             line.push(',');
-            push(&mut line, column.get(row).copied().unwrap_or(f64::NAN));
+            push_exact(&mut line, column.get(row).copied().unwrap_or(f64::NAN));
         }
         line.push('\n');
         sink.write_all(line.as_bytes())?;
     }
     Ok(())
-}
-
-/// A number in its shortest exact form, without hundreds of zeros where it is large or small.
-fn push(text: &mut String, value: f64) {
-    use std::fmt::Write as _;
-    if !value.is_finite() {
-        return;
-    }
-    let size = value.abs();
-    // Writing to a String cannot fail. Adding 0 turns -0 into 0.
-    let _ = if value == 0.0 || (1e-5..1e16).contains(&size) {
-        write!(text, "{}", value + 0.0)
-    } else {
-        write!(text, "{value:e}")
-    };
 }
 
 #[cfg(test)]

@@ -15,3 +15,4 @@ pub use header::{Channel, Header, Required};
 pub use reader::{Recording, Row, Rows};
 pub use run::Run;
 pub use writer::RecordingWriter;
+pub(crate) use writer::push_exact;

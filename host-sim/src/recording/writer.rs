@@ -8,6 +8,7 @@ pub struct RecordingWriter<W: Write> {
     sink: W,
     columns: usize,
     line: String,
+    push: fn(&mut String, f64),
 }
 
 impl<W: Write> RecordingWriter<W> {
@@ -24,7 +25,15 @@ impl<W: Write> RecordingWriter<W> {
             sink,
             columns: columns.len(),
             line: String::new(),
+            push: push_nine_digits,
         })
+    }
+
+    /// Writes numbers with all their digits from now on: what is computed from them again comes out the same.
+    #[must_use]
+    pub fn exact(mut self) -> Self {
+        self.push = push_exact;
+        self
     }
 
     /// Writes one row, each number with nine significant digits: far below any sensor's noise, and
@@ -42,7 +51,7 @@ impl<W: Write> RecordingWriter<W> {
             if index > 0 {
                 self.line.push(',');
             }
-            push_nine_digits(&mut self.line, value);
+            (self.push)(&mut self.line, value);
         }
         self.line.push('\n');
         self.sink.write_all(self.line.as_bytes())
@@ -52,6 +61,21 @@ impl<W: Write> RecordingWriter<W> {
     pub fn into_inner(self) -> W {
         self.sink
     }
+}
+
+/// A number in its shortest exact form, without hundreds of zeros where it is large or small; nothing for one that
+/// is not finite.
+pub(crate) fn push_exact(text: &mut String, value: f64) {
+    use std::fmt::Write as _;
+    if !value.is_finite() {
+        return;
+    }
+    // Writing to a String cannot fail. Adding 0 turns -0 into 0.
+    let _ = if value == 0.0 || (1e-5..1e16).contains(&value.abs()) {
+        write!(text, "{}", value + 0.0)
+    } else {
+        write!(text, "{value:e}")
+    };
 }
 
 fn push_nine_digits(text: &mut String, value: f64) {

@@ -2,7 +2,10 @@
 
 mod brake;
 mod law;
+mod model_noise;
 mod plant;
+mod repaired;
+mod replay;
 mod sensors;
 
 use std::io;
@@ -10,6 +13,8 @@ use std::io;
 pub use brake::{Brake, BrakeProgramme};
 pub use law::{LawTextError, RigLaw};
 pub use plant::{Contact, Plant, PlantEffect, PlantParameters, PlantState, STANDSTILL_M_S};
+pub use repaired::ModelRunError;
+pub use replay::{Replay, ReplayError, replay};
 pub use sensors::Sensors;
 
 use crate::recording::Channel;
