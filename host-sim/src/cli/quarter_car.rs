@@ -97,6 +97,14 @@ fn tell(study: &Study, terminal: &mut Terminal) -> Result<(), Failure> {
     for (heading, table) in [
         ("The best stop (e)", study.references_table()),
         ("Distance over that of (e)", study.comparison_table()),
+        (
+            "The best stop with another tyre law in the plant",
+            study.foreign_references_table(),
+        ),
+        (
+            "Distance over that of (e), other tyre law",
+            study.foreign_table(),
+        ),
         ("Other speeds, dead time", study.variants_table()),
         (
             "Monte Carlo: mass, radius ±2 %, noise × 2, one sample late",
@@ -111,6 +119,7 @@ fn tell(study: &Study, terminal: &mut Terminal) -> Result<(), Failure> {
         terminal.headline(heading)?;
         lines(&table, terminal)?;
     }
+    terminal.line(&study.foreign_verdict())?;
     terminal.verdict(&study.verdict(), study.keeps_all())
 }
 

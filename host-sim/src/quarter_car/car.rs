@@ -1,10 +1,11 @@
 //! The true quarter car: the simulator's plant on patches of road, behind an actuator with limits.
 
+use std::cell::Cell;
 use std::collections::VecDeque;
+use std::rc::Rc;
 
 use super::scenario::{Actuator, GRAVITY_M_S2, Road, SAMPLE_TIME_S, STEPS_A_SAMPLE, Scenario};
-use crate::simulate::{Contact, Plant, PlantEffect, PlantParameters, PlantState, RigLaw};
-use muslip::law::TyreLaw;
+use crate::simulate::{Contact, Plant, PlantEffect, PlantParameters, PlantState};
 
 /// The road's friction over that of its first patch, which is the plant's own law.
 struct Patches(Road);
@@ -14,7 +15,7 @@ impl PlantEffect for Patches {
         if self.0.patches.len() < 2 {
             return 1.0;
         }
-        let (first, here) = (self.0.law_at(0.0), self.0.law_at(contact.distance_m));
+        let (first, here) = (self.0.truth_at(0.0), self.0.truth_at(contact.distance_m));
         if first == here {
             return 1.0;
         }
@@ -24,6 +25,43 @@ impl PlantEffect for Patches {
         } else {
             here.friction(contact.slip_ratio) / first.friction(contact.slip_ratio)
         }
+    }
+}
+
+/// A tyre whose force is that of a slip which follows the true one over a distance, with ds'/dt = v (s − s')/length.
+/// The plant's own law is taken off again, so that what is left of it is what its scheme is implicit in.
+#[derive(Clone)]
+struct Relaxation {
+    road: Road,
+    length_m: f64,
+    radius_m: f64,
+    slip: Rc<Cell<f64>>,
+}
+
+impl Relaxation {
+    /// Force in N beside that of the plant's own law.
+    fn beside_n(&self, contact: &Contact) -> f64 {
+        let first = self.road.truth_at(0.0);
+        let here = self.road.truth_at(contact.distance_m);
+        contact.normal_force_n
+            * (here.friction(self.slip.get()) - first.friction(contact.slip_ratio))
+    }
+}
+
+impl PlantEffect for Relaxation {
+    fn vehicle_force_n(&self, contact: &Contact) -> f64 {
+        self.beside_n(contact)
+    }
+
+    fn wheel_torque_nm(&self, contact: &Contact) -> f64 {
+        -self.radius_m * self.beside_n(contact)
+    }
+
+    fn advance(&mut self, contact: &Contact, _drag_n: f64, dt_s: f64) {
+        // Exact for a slip held over the step.
+        let stays = (-contact.vehicle_speed_m_s * dt_s / self.length_m).exp();
+        let slip = contact.slip_ratio + stays * (self.slip.get() - contact.slip_ratio);
+        self.slip.set(slip);
     }
 }
 
@@ -49,6 +87,7 @@ pub struct Truth {
 /// The quarter car in motion.
 pub struct Car {
     plant: Plant,
+    relaxation: Option<Relaxation>,
     actuator: Actuator,
     normal_force_n: f64,
     brake_torque_nm: f64,
@@ -63,12 +102,22 @@ impl Car {
             inertia_kg_m2: scenario.inertia_kg_m2,
             mass_kg: scenario.mass_kg,
             coasting: true,
-            law: RigLaw::Burckhardt(scenario.road.law_at(0.0)),
+            law: scenario.road.truth_at(0.0),
         };
         let mut plant = Plant::rolling(parameters, scenario.from_m_s);
-        plant.add_effect(Box::new(Patches(scenario.road.clone())));
+        let relaxation = (scenario.relaxation_length_m > 0.0).then(|| Relaxation {
+            road: scenario.road.clone(),
+            length_m: scenario.relaxation_length_m,
+            radius_m: scenario.radius_m,
+            slip: Rc::default(),
+        });
+        match &relaxation {
+            Some(relaxation) => plant.add_effect(Box::new(relaxation.clone())),
+            None => plant.add_effect(Box::new(Patches(scenario.road.clone()))),
+        }
         Self {
             plant,
+            relaxation,
             actuator: scenario.actuator,
             normal_force_n: scenario.mass_kg * GRAVITY_M_S2,
             brake_torque_nm: 0.0,
@@ -86,13 +135,19 @@ impl Car {
             ..
         } = self.plant.state();
         let contact = self.plant.contact(self.normal_force_n);
+        let mut drag_n = self.plant.drag_n(&contact);
+        if let Some(relaxation) = &self.relaxation
+            && !self.plant.stands()
+        {
+            drag_n += relaxation.beside_n(&contact);
+        }
         Truth {
             time_s,
             distance_m,
             wheel_speed_rad_s,
             vehicle_speed_m_s,
             slip_ratio: contact.slip_ratio,
-            friction: self.plant.drag_n(&contact) / self.normal_force_n,
+            friction: drag_n / self.normal_force_n,
             brake_torque_nm: self.brake_torque_nm,
         }
     }

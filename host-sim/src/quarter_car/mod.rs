@@ -4,33 +4,47 @@
 //! [`Driver`] works the brake, [`stop`] runs it, [`optimum`] is what nobody can beat, and [`study`] puts all
 //! drivers beside each other on all roads. The same options give the same figures on any number of threads.
 
+mod banked;
 mod car;
 mod drivers;
+mod faults;
+mod figures;
+mod filtered;
 mod observability;
 mod optimum;
 mod pages;
+mod rig_driven;
+mod rows;
 mod run;
 mod scenario;
+mod search;
 mod study;
+mod surface;
 mod tables;
+mod who;
 
+pub use banked::Banked;
 pub use car::{Car, Truth};
 pub use drivers::{
-    Banked, Channels, Filtered, LockedWheel, NOMINAL, PerfectState, RigDriven, SETPOINT_SHARE,
-    Setpoint, WHEEL_VARIANCE, controller, rolling_speed,
+    Channels, LockedWheel, NOMINAL, PerfectState, SETPOINT_SHARE, WHEEL_VARIANCE, controller,
+    rolling_speed,
 };
+pub use faults::fault;
+pub use figures::{NamedFigure, figures};
+pub use filtered::Filtered;
 pub use observability::{Listener, Observability, WrongStart, listeners, table as observability};
 pub use optimum::{Optimum, best_constant_slip, bound, optimum};
-pub use pages::{NamedFigure, figures, markdown, report_page};
+pub use pages::{markdown, report_page};
+pub use rig_driven::{RigDriven, Setpoint};
+pub use rows::{LOCK_BAR_S, Ratios, Row};
 pub use run::{Belief, Driver, Readings, Sample, Stop, stop, traced};
 pub use scenario::{
-    Actuator, FaultKind, GRAVITY_M_S2, Road, SAMPLE_TIME_S, STEPS_A_SAMPLE, Scenario, SensorFault,
-    SensorNoise,
+    Actuator, FOREIGN_RELAXATION_M, FaultKind, GRAVITY_M_S2, Road, SAMPLE_TIME_S, STEPS_A_SAMPLE,
+    Scenario, SensorFault, SensorNoise,
 };
-pub use study::{
-    BANK_MASS_STD_KG, LOCK_BAR_S, Ratios, Reference, Row, Study, StudyOptions, Who, draw, fault,
-    study, work,
-};
+pub use study::{Reference, Study, StudyOptions, draw, study, work};
+pub use surface::Surface;
+pub use who::{BANK_MASS_STD_KG, Who};
 
 /// A filter, a controller or one of their steps that was refused.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]

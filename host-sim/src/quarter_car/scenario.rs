@@ -1,7 +1,10 @@
 //! What a stop starts from: vehicle, road, brake, sensors, what goes wrong.
 
-use muslip::law::burckhardt::{DRY_ASPHALT, PublishedSet, SNOW, WET_ASPHALT};
-use muslip::law::{Burckhardt, TyreLaw};
+use muslip::law::Burckhardt;
+use muslip::law::burckhardt::{DRY_ASPHALT, SNOW, WET_ASPHALT};
+
+use super::surface::Surface;
+use crate::simulate::RigLaw;
 
 /// Gravity in m/s².
 pub const GRAVITY_M_S2: f64 = 9.81;
@@ -15,16 +18,16 @@ pub const STEPS_A_SAMPLE: u32 = 20;
 pub struct Road {
     /// Name in tables.
     pub name: &'static str,
-    /// (distance in m from which it holds, its set); the first from 0, ascending.
-    pub patches: Vec<(f64, PublishedSet)>,
+    /// (distance in m from which it holds, the surface); the first from 0, ascending.
+    pub patches: Vec<(f64, Surface)>,
 }
 
 impl Road {
     /// One surface throughout.
-    pub fn of(name: &'static str, set: PublishedSet) -> Self {
+    pub fn of(name: &'static str, surface: impl Into<Surface>) -> Self {
         Self {
             name,
-            patches: vec![(0.0, set)],
+            patches: vec![(0.0, surface.into())],
         }
     }
 
@@ -45,9 +48,13 @@ impl Road {
 
     /// Dry, wet from 15 m, dry again from 30 m.
     pub fn step() -> Self {
+        Self::stepped(DRY_ASPHALT.into(), WET_ASPHALT.into())
+    }
+
+    fn stepped(dry: Surface, wet: Surface) -> Self {
         Self {
             name: "dry-wet-dry",
-            patches: vec![(0.0, DRY_ASPHALT), (15.0, WET_ASPHALT), (30.0, DRY_ASPHALT)],
+            patches: vec![(0.0, dry), (15.0, wet), (30.0, dry)],
         }
     }
 
@@ -56,20 +63,39 @@ impl Road {
         [Self::dry(), Self::wet(), Self::snow(), Self::step()]
     }
 
-    /// The law at a distance in m.
-    pub fn law_at(&self, distance_m: f64) -> Burckhardt<f64> {
+    /// The four roads under a tyre that no filter here has: the Magic Formula's.
+    pub fn all_foreign() -> [Self; 4] {
+        let [dry, wet, snow] = Surface::magic();
+        [
+            Self::of("dry", dry),
+            Self::of("wet", wet),
+            Self::of("snow", snow),
+            Self::stepped(dry, wet),
+        ]
+    }
+
+    fn surface_at(&self, distance_m: f64) -> Surface {
         self.patches
             .iter()
             .rev()
             .find(|(from, _)| *from <= distance_m)
             .or(self.patches.first())
-            .map_or(DRY_ASPHALT, |(_, set)| *set)
-            .law()
+            .map_or(DRY_ASPHALT.into(), |(_, surface)| *surface)
     }
 
-    /// Peak friction and its slip at a distance in m.
+    /// The law at a distance in m that a filter is told which knows the road.
+    pub fn law_at(&self, distance_m: f64) -> Burckhardt<f64> {
+        self.surface_at(distance_m).told
+    }
+
+    /// The law that is true at a distance in m.
+    pub fn truth_at(&self, distance_m: f64) -> RigLaw {
+        self.surface_at(distance_m).truth
+    }
+
+    /// True peak friction and its slip at a distance in m.
     pub fn peak_at(&self, distance_m: f64) -> (f64, f64) {
-        let peak = self.law_at(distance_m).peak();
+        let peak = self.truth_at(distance_m).peak();
         (peak.friction, peak.slip_ratio)
     }
 }
@@ -133,6 +159,8 @@ pub struct Scenario {
     pub to_m_s: f64,
     /// The road.
     pub road: Road,
+    /// Distance in m over which the tyre's force follows its slip; 0 where it does so at once.
+    pub relaxation_length_m: f64,
     /// The brake.
     pub actuator: Actuator,
     /// The sensors.
@@ -155,6 +183,7 @@ impl Scenario {
             from_m_s: 30.0,
             to_m_s: 1.0,
             road,
+            relaxation_length_m: 0.0,
             actuator: Actuator {
                 maximum_torque_nm: 3000.0,
                 maximum_rate_nm_s: 20_000.0,
@@ -171,4 +200,16 @@ impl Scenario {
             seed,
         }
     }
+
+    /// The same stop on a tyre that no filter here has: the road's is of [`Road::all_foreign`], and its force follows
+    /// slip over a relaxation length.
+    pub fn foreign(road: Road, seed: u64) -> Self {
+        Self {
+            relaxation_length_m: FOREIGN_RELAXATION_M,
+            ..Self::usual(road, seed)
+        }
+    }
 }
+
+/// Relaxation length of the foreign tyre in m: half the wheel's radius.
+pub const FOREIGN_RELAXATION_M: f64 = 0.15;

@@ -1,23 +1,19 @@
 //! The comparison: rows (a) to (f) on every road, variants, Monte Carlo and what goes wrong, each as a ratio
 //! of stopping distance to the optimum of the same stop.
 
-use muslip::law::burckhardt::WET_ASPHALT;
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::SeedableRng;
 use rayon::prelude::*;
 
 use super::SetupError;
-use super::drivers::{Banked, Filtered, LockedWheel, PerfectState, RigDriven, Setpoint};
+use super::faults::{faults, mistaken};
 use super::observability::{self, Observability};
 use super::optimum::{best_constant_slip, bound, optimum};
-use super::run::{Driver, Stop, stop};
-use super::scenario::{FaultKind, Road, Scenario, SensorFault};
-
-/// What the bank is told of the mass, 1 sigma in kg: 5 %.
-pub const BANK_MASS_STD_KG: f64 = 22.5;
-/// Longest time in s for which a wheel may be locked above 3 m/s.
-pub const LOCK_BAR_S: f64 = 0.2;
+use super::rows::{Ratios, Row};
+use super::run::{Stop, stop};
+use super::scenario::{Road, Scenario};
+use super::who::Who;
 
 /// How much is computed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -50,74 +46,6 @@ impl StudyOptions {
     }
 }
 
-/// Who drives.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Who {
-    /// (a)
-    Perfect,
-    /// (b)
-    Tutorial,
-    /// (c)
-    Tuned,
-    /// (d)
-    Locked,
-    /// (f) four channels, peak sought.
-    RigSought,
-    /// (f) four channels, slip 0.12.
-    RigFixed,
-    /// (f) wheel speed alone, bank of roads.
-    Bank,
-}
-
-impl Who {
-    /// Letter of the row.
-    pub fn letter(self) -> &'static str {
-        match self {
-            Self::Perfect => "(a)",
-            Self::Tutorial => "(b)",
-            Self::Tuned => "(c)",
-            Self::Locked => "(d)",
-            Self::RigSought | Self::RigFixed | Self::Bank => "(f)",
-        }
-    }
-
-    /// What it is.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Perfect => "perfect state",
-            Self::Tutorial => "tutorial's filter",
-            Self::Tuned => "tuned filter, road known",
-            Self::Locked => "locked wheel",
-            Self::RigSought => "four channels, peak sought",
-            Self::RigFixed => "four channels, slip held at 0.12",
-            Self::Bank => "wheel speed alone, bank of roads",
-        }
-    }
-
-    fn driver(self, scenario: &Scenario) -> Result<Box<dyn Driver>, SetupError> {
-        Ok(match self {
-            Self::Perfect => Box::new(PerfectState::new(scenario)?),
-            Self::Tutorial => Box::new(Filtered::tutorial(scenario)?),
-            Self::Tuned => Box::new(Filtered::tuned(scenario)?),
-            Self::Locked => Box::new(LockedWheel),
-            Self::RigSought => Box::new(RigDriven::new(scenario, Setpoint::Sought)?),
-            Self::RigFixed => Box::new(RigDriven::new(scenario, Setpoint::Fixed)?),
-            Self::Bank => Box::new(Banked::new(scenario, BANK_MASS_STD_KG)?),
-        })
-    }
-
-    /// The bar on the median of a stop as nominal on a road, where there is one.
-    fn bar(self, road: &Road) -> Option<f64> {
-        let one_surface = road.patches.len() == 1;
-        match self {
-            Self::Tuned if matches!(road.name, "dry" | "wet") => Some(1.05),
-            Self::RigSought if one_surface => Some(1.10),
-            Self::RigSought => Some(1.15),
-            _ => None,
-        }
-    }
-}
-
 /// The references of a road.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Reference {
@@ -133,81 +61,6 @@ pub struct Reference {
     pub constant_factor: f64,
 }
 
-/// Ratios of a set of stops.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Ratios {
-    /// Median.
-    pub median: f64,
-    /// The ninth decile: the worst tenth begins there.
-    pub worst_tenth: f64,
-    /// The worst.
-    pub worst: f64,
-    /// Mean share of the time with at least 95 % of peak friction.
-    pub near_peak: f64,
-    /// Mean share of the time with more than twice the peak's slip.
-    pub deep: f64,
-    /// Longest time in s with a locked wheel above 3 m/s.
-    pub longest_lock_s: f64,
-    /// How many there are.
-    pub count: usize,
-}
-
-impl Ratios {
-    /// Of (ratio, stop), at least one.
-    fn of(mut stops: Vec<(f64, Stop)>) -> Self {
-        stops.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let at = |share: f64| {
-            let last = stops.len().saturating_sub(1) as f64;
-            stops
-                .get((share * last).round() as usize)
-                .map_or(f64::NAN, |stop| stop.0)
-        };
-        let count = stops.len();
-        let mean = |of: &dyn Fn(&Stop) -> f64| {
-            stops.iter().map(|stop| of(&stop.1)).sum::<f64>() / count as f64
-        };
-        Self {
-            median: at(0.5),
-            worst_tenth: at(0.9),
-            worst: at(1.0),
-            near_peak: mean(&|stop| stop.share_near_peak),
-            deep: mean(&|stop| stop.share_deep),
-            longest_lock_s: stops
-                .iter()
-                .map(|stop| stop.1.longest_lock_s)
-                .fold(0.0, f64::max),
-            count,
-        }
-    }
-}
-
-/// A row of a table of ratios.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Row {
-    /// Who drives.
-    pub who: Who,
-    /// On what.
-    pub road: &'static str,
-    /// What is varied; empty in the comparison itself.
-    pub variant: String,
-    /// The ratios.
-    pub ratios: Ratios,
-    /// The bar on the median.
-    pub bar: Option<f64>,
-}
-
-impl Row {
-    /// Whether the median keeps to the bar, where there is one.
-    pub fn keeps(&self) -> Option<bool> {
-        self.bar.map(|bar| self.ratios.median <= bar)
-    }
-
-    /// Whether no wheel was locked above 3 m/s for longer than allowed; not asked of a locked wheel.
-    pub fn keeps_rolling(&self) -> bool {
-        self.who == Who::Locked || self.ratios.longest_lock_s <= LOCK_BAR_S
-    }
-}
-
 /// All that was computed.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Study {
@@ -217,6 +70,10 @@ pub struct Study {
     pub references: Vec<Reference>,
     /// The comparison.
     pub comparison: Vec<Row>,
+    /// References of each road under a tyre that no filter has.
+    pub foreign_references: Vec<Reference>,
+    /// The comparison on that tyre.
+    pub foreign: Vec<Row>,
     /// Other speeds and the actuator's dead time.
     pub variants: Vec<Row>,
     /// Monte Carlo over vehicle and sensor.
@@ -239,25 +96,23 @@ pub fn study(options: StudyOptions, progress: &mut dyn FnMut(u64)) -> Result<Stu
         done += amount;
         progress(done);
     };
-    let references: Vec<Reference> = Road::all().par_iter().map(reference).collect();
-    tell(4);
-    let mut comparison = Vec::new();
-    for (road, reference) in Road::all().into_iter().zip(&references) {
-        for who in [
-            Who::Perfect,
-            Who::Tutorial,
-            Who::Tuned,
-            Who::Locked,
-            Who::RigSought,
-            Who::RigFixed,
-            Who::Bank,
-        ] {
-            let bar = who.bar(&road);
-            let scenario = Scenario::usual(road.clone(), options.seed);
-            comparison.push(row(who, &scenario, reference.optimum_m, options, "", bar)?);
-            tell(1);
-        }
-    }
+    let references = references(Road::all(), Scenario::usual);
+    let foreign_references = self::references(Road::all_foreign(), Scenario::foreign);
+    tell(8);
+    let comparison = comparison(
+        Road::all(),
+        Scenario::usual,
+        &references,
+        options,
+        &mut tell,
+    )?;
+    let foreign = self::comparison(
+        Road::all_foreign(),
+        Scenario::foreign,
+        &foreign_references,
+        options,
+        &mut tell,
+    )?;
     let mut variants = Vec::new();
     for (variant, change) in [
         (
@@ -285,7 +140,13 @@ pub fn study(options: StudyOptions, progress: &mut dyn FnMut(u64)) -> Result<Stu
         (
             0.3,
             "mass ±30 %",
-            &[Who::Tutorial, Who::Tuned, Who::RigSought, Who::Bank][..],
+            &[
+                Who::Tutorial,
+                Who::Tuned,
+                Who::RigSought,
+                Who::Bank,
+                Who::BankWide,
+            ][..],
         ),
         (0.05, "mass ±5 %", &[Who::Bank]),
     ] {
@@ -308,6 +169,8 @@ pub fn study(options: StudyOptions, progress: &mut dyn FnMut(u64)) -> Result<Stu
         options,
         references,
         comparison,
+        foreign_references,
+        foreign,
         variants,
         monte_carlo,
         faults: faults(options)?,
@@ -318,19 +181,56 @@ pub fn study(options: StudyOptions, progress: &mut dyn FnMut(u64)) -> Result<Stu
 
 /// Units of work that [`study`] tells of.
 pub fn work() -> u64 {
-    4 + 28 + 12 + 64 + 40
+    8 + 56 + 12 + 64 + 48
 }
 
-fn reference(road: &Road) -> Reference {
-    let scenario = Scenario::usual(road.clone(), 1);
-    let (constant_factor, constant_m) = best_constant_slip(&scenario);
-    Reference {
-        road: road.name,
-        bound_m: bound(&scenario),
-        optimum_m: optimum(&scenario).distance_m,
-        constant_m,
-        constant_factor,
+/// A stop on a road, by seed.
+type Usual = fn(Road, u64) -> Scenario;
+
+fn references(roads: [Road; 4], like: Usual) -> Vec<Reference> {
+    roads
+        .into_par_iter()
+        .map(|road| {
+            let name = road.name;
+            let scenario = like(road, 1);
+            let (constant_factor, constant_m) = best_constant_slip(&scenario);
+            Reference {
+                road: name,
+                bound_m: bound(&scenario),
+                optimum_m: optimum(&scenario).distance_m.min(constant_m),
+                constant_m,
+                constant_factor,
+            }
+        })
+        .collect()
+}
+
+/// Rows (a) to (f) on every road.
+fn comparison(
+    roads: [Road; 4],
+    like: Usual,
+    references: &[Reference],
+    options: StudyOptions,
+    tell: &mut impl FnMut(u64),
+) -> Result<Vec<Row>, SetupError> {
+    let mut rows = Vec::new();
+    for (road, reference) in roads.into_iter().zip(references) {
+        for who in [
+            Who::Perfect,
+            Who::Tutorial,
+            Who::Tuned,
+            Who::Locked,
+            Who::RigSought,
+            Who::RigFixed,
+            Who::Bank,
+        ] {
+            let bar = who.bar(&road);
+            let scenario = like(road.clone(), options.seed);
+            rows.push(row(who, &scenario, reference.optimum_m, options, "", bar)?);
+            tell(1);
+        }
     }
+    Ok(rows)
 }
 
 /// Stops that differ in their noise alone, against one optimum in m.
@@ -403,124 +303,4 @@ pub fn draw(road: &Road, seed: u64, mass_share: f64) -> Scenario {
     scenario.noise.wheel_speed_rad_s *= 2.0;
     scenario.late_samples = 1;
     scenario
-}
-
-/// A fault of a sensor of 50 ms from 0.5 s on.
-pub fn fault(kind: FaultKind) -> SensorFault {
-    SensorFault {
-        from_s: 0.5,
-        until_s: 0.55,
-        kind,
-    }
-}
-
-/// The tuned filter on a dry road with what a user meets on the first day.
-fn faults(options: StudyOptions) -> Result<Vec<Row>, SetupError> {
-    type Change = fn(&mut Scenario);
-    type Start = fn(&mut muslip::filter::quarter_car::Config<f64>);
-    let cases: [(&str, Change, Start); 8] = [
-        ("nothing wrong", |_| {}, |_| {}),
-        (
-            "mass 600 kg at the start",
-            |_| {},
-            |c| c.initial_mass_kg = 600.0,
-        ),
-        (
-            "mass 300 kg at the start",
-            |_| {},
-            |c| c.initial_mass_kg = 300.0,
-        ),
-        (
-            "speed 1 m/s too high at the start",
-            |_| {},
-            |c| {
-                c.initial_vehicle_speed_m_s += 1.0;
-                c.initial_std.vehicle_speed_m_s = 1.0;
-            },
-        ),
-        (
-            "speed 1 m/s too low at the start",
-            |_| {},
-            |c| {
-                c.initial_vehicle_speed_m_s -= 1.0;
-                c.initial_std.vehicle_speed_m_s = 1.0;
-            },
-        ),
-        (
-            "brake gives 1000 N m at most",
-            |s| s.actuator.maximum_torque_nm = 1000.0,
-            |_| {},
-        ),
-        (
-            "no reading for 50 ms",
-            |s| s.fault = Some(fault(FaultKind::Missing)),
-            |_| {},
-        ),
-        (
-            "frozen reading for 50 ms",
-            |s| s.fault = Some(fault(FaultKind::Frozen)),
-            |_| {},
-        ),
-    ];
-    let mut rows = Vec::new();
-    for (name, change, start) in cases {
-        for road in [Road::dry(), Road::wet()] {
-            let mut changed = Scenario::usual(road.clone(), options.seed);
-            change(&mut changed);
-            let best = if changed.actuator.maximum_torque_nm < 1500.0 {
-                weak_brake(&changed)
-            } else {
-                optimum(&Scenario {
-                    fault: None,
-                    ..changed.clone()
-                })
-                .distance_m
-            };
-            let stops: Result<Vec<(f64, Stop)>, SetupError> = (0..options.stops)
-                .into_par_iter()
-                .map(|index| {
-                    let scenario = Scenario {
-                        seed: options.seed.wrapping_add(index),
-                        ..changed.clone()
-                    };
-                    let mut driver = Filtered::tuned_with(&scenario, start)?;
-                    let stop = stop(&scenario, &mut driver);
-                    Ok((stop.distance_m / best, stop))
-                })
-                .collect();
-            rows.push(Row {
-                who: Who::Tuned,
-                road: road.name,
-                variant: name.into(),
-                ratios: Ratios::of(stops?),
-                bar: None,
-            });
-        }
-    }
-    Ok(rows)
-}
-
-/// The best stop of a brake too weak for the peak: all that it has, which a wheel that it cannot lock
-/// bears; where it can, the optimum as ever.
-fn weak_brake(scenario: &Scenario) -> f64 {
-    let all = stop(scenario, &mut LockedWheel).distance_m;
-    all.min(optimum(scenario).distance_m)
-}
-
-fn mistaken(options: StudyOptions) -> Result<Ratios, SetupError> {
-    let scenario = Scenario::usual(Road::dry(), options.seed);
-    let best = optimum(&scenario).distance_m;
-    let stops: Result<Vec<(f64, Stop)>, SetupError> = (0..options.stops)
-        .into_par_iter()
-        .map(|index| {
-            let scenario = Scenario {
-                seed: options.seed.wrapping_add(index),
-                ..scenario.clone()
-            };
-            let mut driver = Filtered::mistaken(&scenario, WET_ASPHALT.law())?;
-            let stop = stop(&scenario, &mut driver);
-            Ok((stop.distance_m / best, stop))
-        })
-        .collect();
-    Ok(Ratios::of(stops?))
 }

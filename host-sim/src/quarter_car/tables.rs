@@ -3,7 +3,8 @@
 use serde_json::{Value, json};
 
 use super::drivers::Channels;
-use super::study::{LOCK_BAR_S, Ratios, Row, Study};
+use super::rows::{LOCK_BAR_S, Ratios, Row};
+use super::study::{Reference, Study};
 use crate::paper::Table;
 
 fn ratio(value: f64) -> String {
@@ -37,72 +38,22 @@ fn head(columns: &[&str]) -> Vec<String> {
 impl Study {
     /// The references of each road.
     pub fn references_table(&self) -> Table {
-        Table {
-            head: head(&[
-                "road",
-                "(e) best stop, m",
-                "bound / (e)",
-                "best constant slip / (e)",
-                "that slip over the peak's",
-            ]),
-            rows: self
-                .references
-                .iter()
-                .map(|reference| {
-                    vec![
-                        reference.road.to_owned(),
-                        format!("{:.2}", reference.optimum_m),
-                        ratio(reference.bound_m / reference.optimum_m),
-                        ratio(reference.constant_m / reference.optimum_m),
-                        format!("{:.2}", reference.constant_factor),
-                    ]
-                })
-                .collect(),
-        }
+        references_table(&self.references)
+    }
+
+    /// The same under a tyre that no filter has.
+    pub fn foreign_references_table(&self) -> Table {
+        references_table(&self.foreign_references)
     }
 
     /// Rows (a) to (f) on every road.
     pub fn comparison_table(&self) -> Table {
-        Table {
-            head: head(&[
-                "row",
-                "who",
-                "road",
-                "distance / (e)",
-                "worst",
-                "near the peak",
-                "deep slip",
-                "locked, s",
-                "bar",
-                "verdict",
-            ]),
-            rows: self
-                .comparison
-                .iter()
-                .map(|row| {
-                    let Ratios {
-                        median,
-                        worst,
-                        near_peak,
-                        deep,
-                        longest_lock_s,
-                        ..
-                    } = row.ratios;
-                    vec![
-                        row.who.letter().to_owned(),
-                        row.who.name().to_owned(),
-                        row.road.to_owned(),
-                        ratio(median),
-                        ratio(worst),
-                        percent(near_peak),
-                        percent(deep),
-                        format!("{longest_lock_s:.2}"),
-                        row.bar.map_or(String::new(), |bar| format!("{bar:.2}")),
-                        verdict(row),
-                    ]
-                })
-                .collect(),
-        }
+        comparison_table(&self.comparison)
+    }
+
+    /// The same under a tyre that no filter has.
+    pub fn foreign_table(&self) -> Table {
+        comparison_table(&self.foreign)
     }
 
     /// Other speeds, dead time.
@@ -185,6 +136,22 @@ impl Study {
             .chain(&self.faults)
     }
 
+    /// The answer on a tyre that no filter has, in one sentence; it counts for no verdict.
+    pub fn foreign_verdict(&self) -> String {
+        let judged = || self.foreign.iter().filter_map(Row::keeps);
+        let rolling = self
+            .foreign
+            .iter()
+            .filter(|row| !row.keeps_rolling())
+            .count();
+        format!(
+            "With a tyre law that no filter has, {} of the same {} bars are kept; in {rolling} rows a controlled \
+             wheel is locked above 3 m/s for longer than {LOCK_BAR_S} s.",
+            judged().filter(|kept| *kept).count(),
+            judged().count()
+        )
+    }
+
     /// The answer in one sentence.
     pub fn verdict(&self) -> String {
         let judged = self.judged().count();
@@ -233,19 +200,20 @@ impl Study {
                 })
                 .collect()
         };
-        let references: Vec<Value> = self
-            .references
-            .iter()
-            .map(|reference| {
-                json!({
-                    "road": reference.road,
-                    "optimum_m": reference.optimum_m,
-                    "bound_m": reference.bound_m,
-                    "constant_slip_m": reference.constant_m,
-                    "constant_slip_over_peak": reference.constant_factor,
+        let references = |references: &[Reference]| -> Vec<Value> {
+            references
+                .iter()
+                .map(|reference| {
+                    json!({
+                        "road": reference.road,
+                        "optimum_m": reference.optimum_m,
+                        "bound_m": reference.bound_m,
+                        "constant_slip_m": reference.constant_m,
+                        "constant_slip_over_peak": reference.constant_factor,
+                    })
                 })
-            })
-            .collect();
+                .collect()
+        };
         let observability: Vec<Value> = self
             .observability
             .iter()
@@ -263,14 +231,82 @@ impl Study {
         json!({
             "command": self.options.command(),
             "keeps_all_bars": self.keeps_all(),
-            "references": references,
+            "references": references(&self.references),
             "comparison": rows(&self.comparison),
+            "foreign_references": references(&self.foreign_references),
+            "foreign": rows(&self.foreign),
             "variants": rows(&self.variants),
             "monte_carlo": rows(&self.monte_carlo),
             "faults": rows(&self.faults),
             "believes_wet_on_dry": self.mistaken.median,
             "observability": observability,
         })
+    }
+}
+
+fn references_table(references: &[Reference]) -> Table {
+    Table {
+        head: head(&[
+            "road",
+            "(e) best stop, m",
+            "bound / (e)",
+            "best constant slip / (e)",
+            "that slip over the peak's",
+        ]),
+        rows: references
+            .iter()
+            .map(|reference| {
+                vec![
+                    reference.road.to_owned(),
+                    format!("{:.2}", reference.optimum_m),
+                    ratio(reference.bound_m / reference.optimum_m),
+                    ratio(reference.constant_m / reference.optimum_m),
+                    format!("{:.2}", reference.constant_factor),
+                ]
+            })
+            .collect(),
+    }
+}
+
+fn comparison_table(rows: &[Row]) -> Table {
+    Table {
+        head: head(&[
+            "row",
+            "who",
+            "road",
+            "distance / (e)",
+            "worst",
+            "near the peak",
+            "deep slip",
+            "locked, s",
+            "bar",
+            "verdict",
+        ]),
+        rows: rows
+            .iter()
+            .map(|row| {
+                let Ratios {
+                    median,
+                    worst,
+                    near_peak,
+                    deep,
+                    longest_lock_s,
+                    ..
+                } = row.ratios;
+                vec![
+                    row.who.letter().to_owned(),
+                    row.who.name().to_owned(),
+                    row.road.to_owned(),
+                    ratio(median),
+                    ratio(worst),
+                    percent(near_peak),
+                    percent(deep),
+                    format!("{longest_lock_s:.2}"),
+                    row.bar.map_or(String::new(), |bar| format!("{bar:.2}")),
+                    verdict(row),
+                ]
+            })
+            .collect(),
     }
 }
 

@@ -54,7 +54,7 @@ pub fn replay(
         let mut noise = DragNoise::new(&repaired.noise, seed);
         let sigma = repaired.reading_sigma(run, &drag);
         for (force, sigma) in drag.iter_mut().zip(sigma) {
-            *force += noise.next(sigma);
+            *force += noise.next(noise.of_size(sigma));
         }
     }
     let mut names = Vec::new();

@@ -362,12 +362,12 @@ fn what_cannot_be_simulated_is_told_in_one_line() {
         (&["--model", "none.toml"][..], "none.toml"),
         (
             &["--model", "other.toml"],
-            "other.toml:17:10: schema: \"muslip.model/2\" is not \"muslip.model/1\"",
+            "other.toml:15:10: schema: \"muslip.model/2\" is not \"muslip.model/1\"",
         ),
         (&["--model", found, "--inputs", "none.csv"], "none.csv"),
         (
             &["--model", found, "--inputs", "unloaded.csv"],
-            "unloaded.csv:1:1: column normal_force_n is missing",
+            "unloaded.csv:1:1: required column normal_force_n is missing",
         ),
         (
             &["--model", found, "--inputs", "light.csv"],

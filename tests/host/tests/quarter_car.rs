@@ -6,9 +6,9 @@ mod common;
 
 use common::Scratch;
 use host_sim::quarter_car::{
-    Banked, Driver, FaultKind, Filtered, PerfectState, RigDriven, Road, Scenario, Setpoint, Stop,
-    StudyOptions, WrongStart, draw, fault, figures, listeners, observability, optimum, stop, study,
-    traced,
+    Banked, Car, Driver, FaultKind, Filtered, PerfectState, RigDriven, Road, Scenario, Setpoint,
+    Stop, StudyOptions, WrongStart, draw, fault, figures, listeners, observability, optimum, stop,
+    study, traced,
 };
 use host_sim::report::Shape;
 
@@ -59,6 +59,44 @@ fn it_still_does_with_another_mass_radius_noise_and_a_late_sample() {
         ratios.sort_by(f64::total_cmp);
         assert!(ratios[4] < 1.05, "{} {ratios:?}", road.name);
     }
+}
+
+#[test]
+fn it_still_does_on_dry_and_wet_under_a_tyre_law_that_it_does_not_have() {
+    let [dry, wet, ..] = Road::all_foreign();
+    for road in [dry, wet] {
+        let scenario = Scenario::foreign(road, 31);
+        let stop = stop(&scenario, &mut Filtered::tuned(&scenario).unwrap());
+        let ratio = ratio(&stop, &scenario);
+        assert!(ratio < 1.05, "{}: {ratio}", scenario.road.name);
+    }
+}
+
+#[test]
+fn the_force_of_a_relaxed_tyre_follows_its_slip_and_then_is_its_law_s() {
+    let [dry, ..] = Road::all_foreign();
+    let law = dry.truth_at(0.0);
+    let mut car = Car::new(&Scenario::foreign(dry, 1));
+    let mut while_rising = f64::INFINITY;
+    for sample in 0..200 {
+        car.sample(700.0, |truth| {
+            let steady = law.friction(truth.slip_ratio);
+            // 0.15 m at 30 m/s are 5 ms.
+            if sample == 1 {
+                while_rising = while_rising.min(truth.friction / steady);
+            }
+        });
+    }
+    let truth = car.truth();
+    let steady = law.friction(truth.slip_ratio);
+    assert!(while_rising < 0.8, "{while_rising}");
+    assert!(
+        (truth.friction / steady - 1.0).abs() < 0.01,
+        "{} {steady}",
+        truth.friction
+    );
+    // The forces on wheel and vehicle are those of one tyre: R F = T + J dω/dt, nearly steady.
+    assert!((0.30 * truth.friction * 450.0 * 9.81 - 700.0).abs() < 25.0);
 }
 
 #[test]
