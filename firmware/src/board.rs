@@ -93,7 +93,10 @@ pub struct Started {
 }
 
 /// Dumps the brake, then finds out where it runs and sets that up.
-#[allow(unsafe_code)]
+#[allow(
+    unsafe_code,
+    reason = "start-up takes the peripherals and sets priorities"
+)]
 pub fn start() -> Started {
     // SAFETY: called once, from `main`, before any interrupt is enabled.
     let peripherals = unsafe { Peripherals::steal() };
@@ -128,7 +131,12 @@ pub fn start() -> Started {
         };
         (board, identity, up.parameters.unwrap_or_default())
     };
-    let link = uart::start(&peripherals.RCC, &peripherals.USART1, peripherals.USART2);
+    let link = uart::start(
+        &peripherals.RCC,
+        &peripherals.USART1,
+        peripherals.USART2,
+        !identity.slow_clock,
+    );
     defmt::info!(
         "muslip: emulated {}, core {} Hz, watchdog reset {}, parameters stored {}",
         identity.emulated,
@@ -159,7 +167,10 @@ pub fn cycles() -> u32 {
 }
 
 /// Lets samples come: by the timer on the chip, by the simulator's frames in the emulator.
-#[allow(unsafe_code)]
+#[allow(
+    unsafe_code,
+    reason = "start-up takes the peripherals and sets priorities"
+)]
 pub fn start_sampling() {
     // SAFETY: called once; nobody else has the core's peripherals.
     let mut core = unsafe { cortex_m::Peripherals::steal() };

@@ -11,7 +11,7 @@ use muslip_record::{FRAME_BYTES, FrameReader, Parameters, encode};
 use stm32f4::stm32f405::{Interrupt, NVIC, TIM2, USART3, interrupt};
 
 use crate::cell::InterruptCell;
-use crate::settings::{CYCLES_PER_SAMPLE, wait_for};
+use crate::settings::CYCLES_PER_SAMPLE;
 use crate::uart;
 
 /// True once the emulated board is in use.
@@ -42,14 +42,20 @@ pub struct EmulatedSensors;
 pub struct EmulatedActuators;
 
 /// Sets up USART3 and the instruction counter.
-#[allow(unsafe_code)]
+#[allow(
+    unsafe_code,
+    reason = "raw register values, and what the emulator's interrupt owns"
+)]
 pub fn start(rig: &USART3, counter: &TIM2) -> (EmulatedSensors, EmulatedActuators) {
-    // SAFETY of raw bits: UE, TE, RE, RXNEIE (RM0090, 30.6); TIM2 counting up over 32 bits (18.4). With
-    // `-icount shift=0` it counts instructions.
+    // SAFETY: UE, TE, RE, RXNEIE (RM0090, 30.6.4).
     rig.cr1()
         .write(|w| unsafe { w.bits((1 << 13 | 1 << 3 | 1 << 2 | uart::RXNEIE) as _) });
+    // With `-icount shift=0` the timer counts instructions.
+    // SAFETY: no prescaler (18.4.11).
     counter.psc().write(|w| unsafe { w.bits(0) });
+    // SAFETY: all 32 bits (18.4.12).
     counter.arr().write(|w| unsafe { w.bits(u32::MAX) });
+    // SAFETY: CEN, counting up (18.4.1).
     counter.cr1().write(|w| unsafe { w.bits(1) });
     // SAFETY: the interrupts that use them are enabled after this.
     unsafe {
@@ -69,7 +75,10 @@ pub fn is_active() -> bool {
 }
 
 /// Instructions so far.
-#[allow(unsafe_code)]
+#[allow(
+    unsafe_code,
+    reason = "raw register values, and what the emulator's interrupt owns"
+)]
 pub fn instructions() -> u32 {
     // SAFETY: reading a counter has no effect.
     unsafe { (*TIM2::ptr()).cnt().read().bits() }
@@ -91,10 +100,11 @@ pub fn output() -> BrakeOutput {
 
 impl Sensors for EmulatedSensors {
     fn read(&mut self) -> RawSample {
+        #[allow(unsafe_code, reason = "what the emulator's interrupt owns")]
         // SAFETY: USART3's interrupt has written it before the sampling interrupt was raised, and cannot run
         // while that one does, which is above it.
-        #[allow(unsafe_code)]
-        unsafe { MAILBOX.get() }.copied().unwrap_or_default()
+        let mailbox = unsafe { MAILBOX.get() };
+        mailbox.copied().unwrap_or_default()
     }
 
     fn dump(&mut self) {
@@ -175,14 +185,18 @@ pub fn answer(tick: u32, took: &Took, stack_bytes: u32, totals: [u32; 3]) {
     });
 }
 
-/// Whether the timer raises samples by itself in the emulator. The core must not sleep then: QEMU's virtual time
-/// leaps when it does, and past its timers. Awake it counts instructions and nothing else.
+/// Whether the core must not sleep: while the timer raises samples by itself in the emulator, because QEMU's
+/// virtual time leaps when it does, and past its timers; awake it counts instructions and nothing else. And while
+/// a frame is on its way, because each sleep between two of its bytes costs QEMU more than the byte.
 pub fn runs_freely() -> bool {
     FREE_SAMPLES.load(Ordering::Relaxed) > 0
 }
 
 /// Counts a sample that the timer raised by itself; stops it after the last.
-#[allow(unsafe_code)]
+#[allow(
+    unsafe_code,
+    reason = "raw register values, and what the emulator's interrupt owns"
+)]
 pub fn count_free_sample() {
     let left = FREE_SAMPLES.load(Ordering::Relaxed);
     if left > 0 {
@@ -195,7 +209,10 @@ pub fn count_free_sample() {
 }
 
 /// Sends a frame to the simulator, where there is one.
-#[allow(unsafe_code)]
+#[allow(
+    unsafe_code,
+    reason = "raw register values, and what the emulator's interrupt owns"
+)]
 pub fn say(message: &FromFirmware) {
     if !is_active() {
         return;
@@ -206,8 +223,8 @@ pub fn say(message: &FromFirmware) {
     };
     // SAFETY: the transmitter is used by the main loop, and by fault handlers that never return to it.
     let rig = unsafe { &*USART3::ptr() };
+    // QEMU's UART is always ready, and each look at its status costs QEMU more than the byte.
     for &byte in frame {
-        wait_for(1_000_000, || rig.sr().read().bits() as u32 & uart::TXE != 0);
         // SAFETY: any byte may be sent.
         rig.dr().write(|w| unsafe { w.bits(u16::from(byte) as _) });
     }
@@ -215,9 +232,10 @@ pub fn say(message: &FromFirmware) {
 
 #[interrupt]
 fn USART3() {
+    #[allow(unsafe_code, reason = "what the emulator's interrupt owns")]
     // SAFETY: only this interrupt calls it, and the receiver's registers are read here only.
-    #[allow(unsafe_code)]
-    let (Some(reader), rig) = (unsafe { (RECEIVER.get(), &*USART3::ptr()) }) else {
+    let (receiver, rig) = unsafe { (RECEIVER.get(), &*USART3::ptr()) };
+    let Some(reader) = receiver else {
         return;
     };
     while rig.sr().read().bits() as u32 & uart::RXNE != 0 {
@@ -228,7 +246,10 @@ fn USART3() {
     }
 }
 
-#[allow(unsafe_code)]
+#[allow(
+    unsafe_code,
+    reason = "raw register values, and what the emulator's interrupt owns"
+)]
 fn obey(message: &ToFirmware) {
     match message {
         ToFirmware::Sample {
@@ -261,7 +282,10 @@ fn obey(message: &ToFirmware) {
     }
 }
 
-#[allow(unsafe_code)]
+#[allow(
+    unsafe_code,
+    reason = "raw register values, and what the emulator's interrupt owns"
+)]
 fn put(raw: &RawSample, burn: u32) {
     // SAFETY: the sampling interrupt is not pending: the simulator waits for its answer before it sends.
     if let Some(place) = unsafe { MAILBOX.get() } {

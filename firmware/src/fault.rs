@@ -33,7 +33,7 @@ fn panic(_: &PanicInfo) -> ! {
 }
 
 // SAFETY: never returns to what faulted.
-#[allow(unsafe_code)]
+#[allow(unsafe_code, reason = "a fault handler is unsafe by its type")]
 #[exception]
 unsafe fn HardFault(_: &ExceptionFrame) -> ! {
     dump();

@@ -5,6 +5,10 @@
 //! on is decided at start-up by one bit (see docs/design/0005-controller.md).
 #![no_std]
 #![cfg_attr(not(test), deny(clippy::indexing_slicing))]
+#![deny(
+    clippy::undocumented_unsafe_blocks,
+    clippy::allow_attributes_without_reason
+)]
 
 pub mod log_ring;
 pub mod settings;

@@ -21,8 +21,11 @@ struct State {
 
 struct Shared(UnsafeCell<State>);
 
+#[allow(
+    unsafe_code,
+    reason = "defmt's logger is shared by every context, in critical sections"
+)]
 // SAFETY: every access is inside a critical section on a single core.
-#[allow(unsafe_code)]
 unsafe impl Sync for Shared {}
 
 static SHARED: Shared = Shared(UnsafeCell::new(State {
@@ -32,8 +35,11 @@ static SHARED: Shared = Shared(UnsafeCell::new(State {
 }));
 static TAKEN: AtomicBool = AtomicBool::new(false);
 
+#[allow(
+    unsafe_code,
+    reason = "defmt's logger is shared by every context, in critical sections"
+)]
 // SAFETY: acquire opens a critical section that release closes; between them nothing else runs.
-#[allow(unsafe_code)]
 unsafe impl defmt::Logger for Logger {
     fn acquire() {
         // SAFETY: released in `release`, with the same state.
@@ -77,10 +83,22 @@ unsafe impl defmt::Logger for Logger {
 
 /// Takes the oldest byte of the log.
 pub fn pop() -> Option<u8> {
+    with_ring(LogRing::pop)
+}
+
+/// Whether the log has nothing to send.
+pub fn is_empty() -> bool {
+    with_ring(|ring| ring.is_empty())
+}
+
+fn with_ring<T>(work: impl FnOnce(&mut LogRing<RING_BYTES>) -> T) -> T {
     critical_section::with(|_| {
+        #[allow(
+            unsafe_code,
+            reason = "defmt's logger is shared by every context, in critical sections"
+        )]
         // SAFETY: inside a critical section.
-        #[allow(unsafe_code)]
         let state = unsafe { &mut *SHARED.0.get() };
-        state.ring.pop()
+        work(&mut state.ring)
     })
 }

@@ -33,6 +33,11 @@ impl<const N: usize> LogRing<N> {
         }
     }
 
+    /// Whether there is nothing in it.
+    pub const fn is_empty(&self) -> bool {
+        self.length == 0
+    }
+
     /// Takes the oldest byte.
     pub fn pop(&mut self) -> Option<u8> {
         if self.length == 0 {
@@ -69,7 +74,9 @@ mod tests {
                 assert_eq!(ring.pop(), Some(round.wrapping_mul(7).wrapping_add(byte)));
             }
             assert_eq!(ring.pop(), None);
+            assert!(ring.is_empty());
             ring.push(1);
+            assert!(!ring.is_empty());
             assert_eq!(ring.pop(), Some(1));
         }
     }

@@ -20,8 +20,11 @@ pub fn split<T, const N: usize>(queue: &'static mut Queue<T, N>) -> (Sender<T>, 
 
 /// Says that a capacity is that of a queue made by [`split`].
 fn has_room_for_one(capacity: usize) {
+    #[allow(
+        unsafe_code,
+        reason = "tells the compiler a capacity that it cannot see"
+    )]
     // SAFETY: the capacity is N - 1 with N > 1, checked where the queue was parted.
-    #[allow(unsafe_code)]
     unsafe {
         assert_unchecked(capacity != usize::MAX);
     }

@@ -53,9 +53,10 @@ pub fn reset_totals() {
 #[exception]
 fn SysTick() {
     let start = board::cycles();
+    #[allow(unsafe_code, reason = "what the sampling interrupt owns")]
     // SAFETY: only this interrupt calls it.
-    #[allow(unsafe_code)]
-    let Some(sampler) = (unsafe { SAMPLER.get() }) else {
+    let sampler = unsafe { SAMPLER.get() };
+    let Some(sampler) = sampler else {
         return;
     };
     emulator::count_free_sample();
@@ -98,8 +99,8 @@ pub fn run(started: Started) -> ! {
             sensors,
             samples: producer,
         };
+        #[allow(unsafe_code, reason = "what the sampling interrupt owns")]
         // SAFETY: the timer is started after this.
-        #[allow(unsafe_code)]
         unsafe {
             SAMPLER.fill(sampler);
         }
@@ -152,8 +153,8 @@ impl Loop {
             if !self.samples.ready() {
                 cortex_m::asm::wfi();
             }
+            #[allow(unsafe_code, reason = "interrupts are switched on again")]
             // SAFETY: they were on before.
-            #[allow(unsafe_code)]
             unsafe {
                 cortex_m::interrupt::enable();
             }

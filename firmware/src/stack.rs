@@ -3,7 +3,10 @@
 use cortex_m_rt::STACK_PAINT_VALUE;
 
 /// Deepest use so far in bytes.
-#[allow(unsafe_code)]
+#[allow(
+    unsafe_code,
+    reason = "reads the stack's paint between two symbols of the linker"
+)]
 pub fn used_bytes() -> u32 {
     unsafe extern "C" {
         static _stack_start: u32;

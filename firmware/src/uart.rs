@@ -9,7 +9,7 @@ use stm32f4::stm32f405::{Interrupt, NVIC, RCC, USART1, USART2, interrupt};
 
 use crate::cell::InterruptCell;
 use crate::queue::{self, Sender, Taker};
-use crate::settings::{APB1_HZ, APB2_HZ, LOG_BAUD, baud_divisor};
+use crate::settings::{APB1_HZ, APB2_HZ, HSI_HZ, LOG_BAUD, baud_divisor};
 
 /// Received bytes that may wait: five samples of a full wire.
 const RECEIVE_BYTES: usize = 512;
@@ -106,19 +106,33 @@ pub fn allow(bytes: u32) {
     PACED.store(true, Ordering::Relaxed);
 }
 
-/// Sets up both UARTs (pins are the board's). `None` when called twice.
-#[allow(unsafe_code)]
-pub fn start(rcc: &RCC, log: &USART1, link: USART2) -> Option<LinkEnd> {
-    // SAFETY of all raw bits here: the values are those of RM0090, sections 7.3 and 30.6.
+/// Sets up both UARTs (pins are the board's) for the clock that the core has come up with: on the internal
+/// oscillator buses are not divided, and the host must still be told of the fault. `None` when called twice.
+#[allow(
+    unsafe_code,
+    reason = "raw register values, and what the interrupt owns"
+)]
+pub fn start(rcc: &RCC, log: &USART1, link: USART2, full_clock: bool) -> Option<LinkEnd> {
+    let (log_hz, link_hz) = if full_clock {
+        (APB2_HZ, APB1_HZ)
+    } else {
+        (HSI_HZ, HSI_HZ)
+    };
+    // SAFETY: USART2EN (RM0090, 7.3.13).
     rcc.apb1enr()
         .modify(|r, w| unsafe { w.bits(r.bits() | 1 << 17) });
+    // SAFETY: USART1EN (7.3.14).
     rcc.apb2enr()
         .modify(|r, w| unsafe { w.bits(r.bits() | 1 << 4) });
+    // SAFETY: mantissa and fraction (30.6.3).
     log.brr()
-        .write(|w| unsafe { w.bits(u32::from(baud_divisor(APB2_HZ, LOG_BAUD)) as _) });
+        .write(|w| unsafe { w.bits(u32::from(baud_divisor(log_hz, LOG_BAUD)) as _) });
+    // SAFETY: bits of 30.6.4.
     log.cr1().write(|w| unsafe { w.bits((UE | TE) as _) });
+    // SAFETY: mantissa and fraction.
     link.brr()
-        .write(|w| unsafe { w.bits(u32::from(baud_divisor(APB1_HZ, LINK_BAUD)) as _) });
+        .write(|w| unsafe { w.bits(u32::from(baud_divisor(link_hz, LINK_BAUD)) as _) });
+    // SAFETY: bits of 30.6.4.
     link.cr1()
         .write(|w| unsafe { w.bits((UE | TE | RE | RXNEIE) as _) });
 
@@ -142,9 +156,12 @@ pub fn start(rcc: &RCC, log: &USART1, link: USART2) -> Option<LinkEnd> {
 }
 
 /// Sends a byte of the log where there is one and the UART takes it; whether more may be done.
-#[allow(unsafe_code)]
+#[allow(
+    unsafe_code,
+    reason = "raw register values, and what the interrupt owns"
+)]
 pub fn pump_log(log: &USART1) -> bool {
-    if log.sr().read().bits() as u32 & TXE == 0 {
+    if crate::log::is_empty() || log.sr().read().bits() as u32 & TXE == 0 {
         return false;
     }
     let Some(byte) = crate::log::pop() else {
@@ -157,16 +174,20 @@ pub fn pump_log(log: &USART1) -> bool {
 
 #[interrupt]
 fn USART2() {
+    #[allow(unsafe_code, reason = "what this interrupt owns")]
     // SAFETY: only this interrupt calls it.
-    #[allow(unsafe_code)]
-    let Some(line) = (unsafe { LINE.get() }) else {
+    let line = unsafe { LINE.get() };
+    let Some(line) = line else {
         return;
     };
     line.service();
 }
 
 impl Line {
-    #[allow(unsafe_code)]
+    #[allow(
+        unsafe_code,
+        reason = "raw register values, and what the interrupt owns"
+    )]
     fn service(&mut self) {
         loop {
             let status = self.uart.sr().read().bits() as u32;

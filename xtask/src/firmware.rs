@@ -5,9 +5,9 @@ use std::fs;
 use std::path::PathBuf;
 
 use anyhow::{Context, Result, bail, ensure};
-use object::{Object, ObjectSection, ObjectSymbol, SectionKind};
 
 use crate::figures::{figures, replaced_between};
+use crate::image::{Forbidden, Image};
 use crate::setup;
 use crate::step::{cargo, command, root, run, step};
 
@@ -19,60 +19,17 @@ const PROFILE: &str = "firmware";
 const CYCLES_PER_SAMPLE: u64 = 168_000;
 /// Simulated seconds of the endurance run in `cargo xtask test`; ten minutes is `cargo xtask pil --seconds 600`.
 const SECONDS_IN_TEST: &str = "5";
+/// Images with what must not be in one.
+const BAD_IMAGES: [(Forbidden, &str); 3] = [
+    (Forbidden::Panic, "panic-image"),
+    (Forbidden::Double, "double-image"),
+    (Forbidden::Heap, "heap-image"),
+];
 /// Where the README's table is.
 const TABLE: [&str; 2] = [
     "<!-- firmware figures -->",
     "<!-- end of firmware figures -->",
 ];
-
-/// Parts of symbols' names that must not be in the image, and what they would mean.
-const FORBIDDEN: [(&str, &[&str]); 3] = [
-    (
-        "a panic",
-        &[
-            "4core9panicking",
-            "rust_begin_unwind",
-            "slice_index_fail",
-            "unwrap_failed",
-            "expect_failed",
-        ],
-    ),
-    (
-        "software double precision",
-        &[
-            "__aeabi_d",
-            "__aeabi_f2d",
-            "__aeabi_i2d",
-            "__aeabi_ui2d",
-            "__aeabi_l2d",
-            "__adddf3",
-            "__subdf3",
-            "__muldf3",
-            "__divdf3",
-            "__extendsfdf2",
-            "__truncdfsf2",
-            "__floatsidf",
-            "__fixdfsi",
-        ],
-    ),
-    (
-        "a heap",
-        &[
-            "__rust_alloc",
-            "__rust_realloc",
-            "__rg_alloc",
-            "5alloc5alloc",
-        ],
-    ),
-];
-
-/// What an image takes, from its ELF file.
-struct Image {
-    flash_bytes: u64,
-    ram_bytes: u64,
-    stack_bytes: u64,
-    forbidden: Vec<String>,
-}
 
 fn target_folder() -> PathBuf {
     std::env::var_os("CARGO_TARGET_DIR")
@@ -83,63 +40,17 @@ fn image_path(name: &str) -> PathBuf {
     target_folder().join(TARGET).join(PROFILE).join(name)
 }
 
-/// Builds the image, and the one that panics.
+/// Builds the image, and those that the checks must refuse.
 pub fn build() -> Result<()> {
     let arguments = ["build", "--locked", "--quiet", "--package", "firmware"];
     let target = ["--profile", PROFILE, "--target", TARGET];
     let image = [&arguments[..], &target, &["--bin", "muslip-firmware"]].concat();
     run("firmware", cargo(&image))?;
-    let test = ["--features", "test-image", "--bin", "panic-image"];
-    run(
-        "firmware that panics on purpose",
-        cargo(&[&arguments[..], &target, &test].concat()),
-    )
-}
-
-impl Image {
-    fn read(name: &str) -> Result<Self> {
-        let path = image_path(name);
-        let bytes = fs::read(&path).with_context(|| path.display().to_string())?;
-        let elf = object::File::parse(&*bytes)?;
-        let mut image = Self {
-            flash_bytes: 0,
-            ram_bytes: 0,
-            stack_bytes: 0,
-            forbidden: Vec::new(),
-        };
-        for section in elf.sections() {
-            let in_ram = section.address() >= 0x2000_0000;
-            match section.kind() {
-                SectionKind::Text | SectionKind::ReadOnlyData | SectionKind::ReadOnlyString => {
-                    image.flash_bytes += section.size();
-                }
-                SectionKind::Data if in_ram => {
-                    image.flash_bytes += section.size();
-                    image.ram_bytes += section.size();
-                }
-                // The vector table is data that stays in flash.
-                SectionKind::Data => image.flash_bytes += section.size(),
-                SectionKind::UninitializedData => image.ram_bytes += section.size(),
-                _ => {}
-            }
-        }
-        let mut stack = [0; 2];
-        for symbol in elf.symbols() {
-            let name = symbol.name()?;
-            match name {
-                "_stack_end" => stack[0] = symbol.address(),
-                "_stack_start" => stack[1] = symbol.address(),
-                _ => {}
-            }
-            for (meaning, parts) in FORBIDDEN {
-                if parts.iter().any(|part| name.contains(part)) {
-                    image.forbidden.push(format!("{meaning}: {name}"));
-                }
-            }
-        }
-        image.stack_bytes = stack[1] - stack[0];
-        Ok(image)
+    let mut bad = [&arguments[..], &target, &["--features", "test-image"]].concat();
+    for (_, name) in BAD_IMAGES {
+        bad.extend(["--bin", name]);
     }
+    run("images that must be refused", cargo(&bad))
 }
 
 fn budget(budgets: &BTreeMap<String, u64>, name: &str) -> Result<u64> {
@@ -156,33 +67,36 @@ pub fn budgets() -> Result<()> {
 }
 
 fn check_image() -> Result<()> {
-    let budgets = figures(&fs::read_to_string(root().join(".ci/budgets.toml"))?)?;
-    let image = Image::read("muslip-firmware")?;
+    let image = Image::read(&image_path("muslip-firmware"))?;
+    check_sizes(&image, &budgets_file()?)?;
+    image.is_clean()?;
+    println!("no panic, no software double precision, no heap in the image");
+    // A check that never fails proves nothing.
+    for (what, name) in BAD_IMAGES {
+        let bad = Image::read(&image_path(name))?;
+        ensure!(
+            bad.has(what) && bad.is_clean().is_err(),
+            "{name} has {} in it, and the check does not see it",
+            what.meaning()
+        );
+        println!("{name} is refused: there is {} in it", what.meaning());
+    }
+    Ok(())
+}
+
+fn check_sizes(image: &Image, budgets: &BTreeMap<String, u64>) -> Result<()> {
     for (what, took, most) in [
-        ("flash", image.flash_bytes, budget(&budgets, "flash_bytes")?),
-        (
-            "static RAM",
-            image.ram_bytes,
-            budget(&budgets, "ram_bytes")?,
-        ),
+        ("flash", image.flash_bytes, budget(budgets, "flash_bytes")?),
+        ("static RAM", image.ram_bytes, budget(budgets, "ram_bytes")?),
     ] {
         println!("{what}: {took} of {most} bytes");
         ensure!(took <= most, "{what}: {took} bytes, the budget is {most}");
     }
-    if !image.forbidden.is_empty() {
-        bail!("in the image there is {}", image.forbidden.join("; "));
-    }
-    println!("no panic, no software double precision, no heap in the image");
-    // A check that never fails proves nothing: the image made to panic must not pass it.
-    let panics = Image::read("panic-image")?;
-    ensure!(
-        panics
-            .forbidden
-            .iter()
-            .any(|found| found.starts_with("a panic")),
-        "the check does not see the panic of the image that panics"
-    );
     Ok(())
+}
+
+fn budgets_file() -> Result<BTreeMap<String, u64>> {
+    figures(&fs::read_to_string(root().join(".ci/budgets.toml"))?)
 }
 
 /// Builds, checks and runs the image in QEMU; `write` puts the figures into the README.
@@ -206,7 +120,11 @@ pub fn pil(arguments: &[String], write: bool) -> Result<()> {
         .env("RUST_BACKTRACE", "0");
     run("processor in the loop", pil)?;
     step("budgets of the runs", || {
-        let table = check_runs(&figures(&fs::read_to_string(&path)?)?)?;
+        let table = check_runs(
+            &figures(&fs::read_to_string(&path)?)?,
+            &Image::read(&image_path("muslip-firmware"))?,
+            &budgets_file()?,
+        )?;
         print!("{table}");
         if write { write_table(&table) } else { Ok(()) }
     })
@@ -235,27 +153,29 @@ pub fn test() -> Result<()> {
     pil(&["--seconds".to_owned(), SECONDS_IN_TEST.to_owned()], false)
 }
 
-fn check_runs(measured: &BTreeMap<String, u64>) -> Result<String> {
-    let budgets = figures(&fs::read_to_string(root().join(".ci/budgets.toml"))?)?;
-    let image = Image::read("muslip-firmware")?;
+fn check_runs(
+    measured: &BTreeMap<String, u64>,
+    image: &Image,
+    budgets: &BTreeMap<String, u64>,
+) -> Result<String> {
     let took = |name: &str| {
         measured
             .get(name)
             .copied()
             .with_context(|| format!("the runs measured no {name}"))
     };
-    let work = CYCLES_PER_SAMPLE * budget(&budgets, "work_percent")? / 100;
-    let stack = image.stack_bytes * budget(&budgets, "stack_percent")? / 100;
+    let work = CYCLES_PER_SAMPLE * budget(budgets, "work_percent")? / 100;
+    let stack = image.stack_bytes * budget(budgets, "stack_percent")? / 100;
     let rows = [
         (
             "flash, bytes",
             image.flash_bytes,
-            budget(&budgets, "flash_bytes")?,
+            budget(budgets, "flash_bytes")?,
         ),
         (
             "static RAM, bytes",
             image.ram_bytes,
-            budget(&budgets, "ram_bytes")?,
+            budget(budgets, "ram_bytes")?,
         ),
         ("deepest stack, bytes", took("stack")?, stack),
         (
@@ -317,4 +237,65 @@ pub fn flash() -> Result<()> {
         "reset",
         command("probe-rs", &["reset", "--chip", "STM32F405RGTx"]),
     )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Image, check_runs, check_sizes, figures};
+
+    #[test]
+    fn each_figure_at_its_budget_passes_and_one_above_fails_by_its_name() {
+        let budgets =
+            figures("flash_bytes = 100\nram_bytes = 10\nstack_percent = 50\nwork_percent = 20")
+                .unwrap();
+        // Half of 16 bytes of stack, a fifth of 168,000 cycles.
+        let most = [100, 10, 8, 33_600, 33_600, 33_600];
+        let check = |figure: [u64; 6]| {
+            let [flash_bytes, ram_bytes, stack, interrupt, control, step] = figure;
+            let image = Image {
+                flash_bytes,
+                ram_bytes,
+                stack_bytes: 16,
+                forbidden: Vec::new(),
+            };
+            let measured = format!(
+                "stack = {stack}\ninterrupt = {interrupt}\ncontrol = {control}\nstep = {step}"
+            );
+            check_sizes(&image, &budgets)
+                .and_then(|()| check_runs(&figures(&measured)?, &image, &budgets))
+        };
+        assert!(
+            check(most)
+                .unwrap()
+                .contains("| flash, bytes | 100 | 100 |")
+        );
+        let names = [
+            "flash",
+            "static RAM",
+            "deepest stack",
+            "sampling interrupt",
+            "control step",
+            "whole work",
+        ];
+        for (index, name) in names.into_iter().enumerate() {
+            let mut above = most;
+            above[index] += 1;
+            let error = check(above).unwrap_err().to_string();
+            assert!(error.contains(name), "{error}");
+        }
+    }
+
+    #[test]
+    fn a_figure_that_was_not_measured_is_no_pass() {
+        let budgets =
+            figures("flash_bytes = 1\nram_bytes = 1\nstack_percent = 1\nwork_percent = 1");
+        let image = Image {
+            flash_bytes: 0,
+            ram_bytes: 0,
+            stack_bytes: 0,
+            forbidden: Vec::new(),
+        };
+        let measured = figures("stack = 0\ninterrupt = 0\ncontrol = 0").unwrap();
+        assert!(check_runs(&measured, &image, &budgets.unwrap()).is_err());
+    }
 }

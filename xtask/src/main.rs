@@ -5,6 +5,7 @@ mod check;
 mod cycles;
 mod figures;
 mod firmware;
+mod image;
 mod setup;
 mod step;
 mod test;

@@ -1,5 +1,6 @@
 //! What the tests need beyond a Rust toolchain: rustup targets and system packages.
 
+use std::ffi::OsString;
 use std::process::Command;
 
 use anyhow::{Context, Result, bail};
@@ -46,99 +47,207 @@ const CYCLES_TOOLS: &[Tool] = &[
 
 /// As [`run_all`], for `cargo xtask cycles`.
 pub fn for_cycles() -> Result<()> {
-    targets()?;
-    tools(CYCLES_TOOLS)
+    Machine::this().set_up(CYCLES_TOOLS)
 }
 
 /// Installs what is missing, or says exactly what to install.
 pub fn run_all() -> Result<()> {
-    targets()?;
-    tools(TOOLS)
+    Machine::this().set_up(TOOLS)
 }
 
-fn targets() -> Result<()> {
-    let Ok(listed) = command("rustup", &["target", "list", "--installed"]).output() else {
-        // A toolchain without rustup: its targets are somebody else's work, and the builds will tell.
-        return Ok(());
-    };
-    let installed = String::from_utf8_lossy(&listed.stdout).into_owned();
-    let missing: Vec<&str> = TARGETS
-        .into_iter()
-        .filter(|target| !installed.lines().any(|line| line.trim() == *target))
-        .collect();
-    if missing.is_empty() {
-        return Ok(());
-    }
-    let mut install = command("rustup", &["target", "add"]);
-    install.args(&missing);
-    run(&format!("install {}", missing.join(", ")), install)
+/// A machine, as far as it is found along a search path.
+struct Machine {
+    path: OsString,
 }
 
-fn tools(wanted: &[Tool]) -> Result<()> {
-    let missing: Vec<&Tool> = wanted
-        .iter()
-        .filter(|tool| !present(tool.program))
-        .collect();
-    if missing.is_empty() {
-        return Ok(());
+impl Machine {
+    fn this() -> Self {
+        Self {
+            path: std::env::var_os("PATH").unwrap_or_default(),
+        }
     }
-    let packages: Vec<&str> = missing.iter().map(|tool| tool.package).collect();
-    let packages = packages.join(" ");
-    if !(present("apt-get") && is_root()) {
-        let reasons: Vec<String> = missing
-            .iter()
-            .map(|tool| format!("{} for {}", tool.program, tool.needed_for))
+
+    fn set_up(&self, wanted: &[Tool]) -> Result<()> {
+        self.targets()?;
+        self.tools(wanted)
+    }
+
+    /// A program of this machine.
+    fn command(&self, program: &str, arguments: &[&str]) -> Command {
+        let mut command = command(program, arguments);
+        command.env("PATH", &self.path);
+        command
+    }
+
+    fn targets(&self) -> Result<()> {
+        let Ok(listed) = self
+            .command("rustup", &["target", "list", "--installed"])
+            .output()
+        else {
+            // A toolchain without rustup: its targets are somebody else's work, and the builds will tell.
+            return Ok(());
+        };
+        let installed = String::from_utf8_lossy(&listed.stdout).into_owned();
+        let missing: Vec<&str> = TARGETS
+            .into_iter()
+            .filter(|target| !installed.lines().any(|line| line.trim() == *target))
             .collect();
-        bail!(
-            "missing {}; install with: sudo apt-get install {packages}",
-            reasons.join(", ")
-        );
+        if missing.is_empty() {
+            return Ok(());
+        }
+        let mut install = self.command("rustup", &["target", "add"]);
+        install.args(&missing);
+        run(&format!("install {}", missing.join(", ")), install)
     }
-    run(
-        "update package lists",
-        command("apt-get", &["update", "-q"]),
-    )?;
-    let mut install = command(
-        "apt-get",
-        &["install", "-q", "-y", "--no-install-recommends"],
-    );
-    install
-        .args(packages.split(' '))
-        .env("DEBIAN_FRONTEND", "noninteractive");
-    run(&format!("install {packages}"), install)
-        .with_context(|| format!("install by hand: {packages}"))
-}
 
-fn present(program: &str) -> bool {
-    std::env::var_os("PATH").is_some_and(|path| {
-        std::env::split_paths(&path).any(|folder| folder.join(program).is_file())
-    })
-}
+    fn tools(&self, wanted: &[Tool]) -> Result<()> {
+        let missing: Vec<&Tool> = wanted
+            .iter()
+            .filter(|tool| !self.has(tool.program))
+            .collect();
+        if missing.is_empty() {
+            return Ok(());
+        }
+        let packages: Vec<&str> = missing.iter().map(|tool| tool.package).collect();
+        let packages = packages.join(" ");
+        if !(self.has("apt-get") && self.is_root()) {
+            let reasons: Vec<String> = missing
+                .iter()
+                .map(|tool| format!("{} for {}", tool.program, tool.needed_for))
+                .collect();
+            bail!(
+                "missing {}; install with: sudo apt-get install {packages}",
+                reasons.join(", ")
+            );
+        }
+        run(
+            "update package lists",
+            self.command("apt-get", &["update", "-q"]),
+        )?;
+        let mut install = self.command(
+            "apt-get",
+            &["install", "-q", "-y", "--no-install-recommends"],
+        );
+        install
+            .args(packages.split(' '))
+            .env("DEBIAN_FRONTEND", "noninteractive");
+        run(&format!("install {packages}"), install)
+            .with_context(|| format!("install by hand: {packages}"))?;
+        match missing.iter().find(|tool| !self.has(tool.program)) {
+            None => Ok(()),
+            Some(tool) => bail!(
+                "package {} is installed but {} is not on the search path",
+                tool.package,
+                tool.program
+            ),
+        }
+    }
 
-fn is_root() -> bool {
-    Command::new("id")
-        .arg("-u")
-        .output()
-        .is_ok_and(|id| id.stdout.trim_ascii() == b"0")
+    fn has(&self, program: &str) -> bool {
+        std::env::split_paths(&self.path).any(|folder| folder.join(program).is_file())
+    }
+
+    fn is_root(&self) -> bool {
+        self.command("id", &["-u"])
+            .output()
+            .is_ok_and(|id| id.stdout.trim_ascii() == b"0")
+    }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::{Tool, present, tools};
+    use super::{Machine, TARGETS, TOOLS};
+    use std::fs;
+    use std::os::unix::fs::PermissionsExt;
+    use tempfile::TempDir;
+
+    /// A machine with these programs alone, scripts of a shell; each writes its arguments into a log.
+    struct Bare {
+        folder: TempDir,
+        machine: Machine,
+    }
+
+    impl Bare {
+        fn new(programs: &[(&str, &str)]) -> Self {
+            let folder = tempfile::tempdir().unwrap();
+            for (name, script) in programs {
+                let path = folder.path().join(name);
+                let text = format!(
+                    "#!/bin/sh\nhere='{}'\necho \"{name} $*\" >> \"$here/log\"\n{script}\n",
+                    folder.path().display()
+                );
+                fs::write(&path, text).unwrap();
+                fs::set_permissions(&path, fs::Permissions::from_mode(0o755)).unwrap();
+            }
+            let machine = Machine {
+                path: folder.path().into(),
+            };
+            Self { folder, machine }
+        }
+
+        fn log(&self) -> String {
+            fs::read_to_string(self.folder.path().join("log")).unwrap_or_default()
+        }
+    }
+
+    const ROOT: (&str, &str) = ("id", "echo 0");
+    const INSTALLS: (&str, &str) = (
+        "apt-get",
+        "[ \"$1\" = install ] && : > \"$here/qemu-system-arm\"; exit 0",
+    );
 
     #[test]
     fn programs_are_found_on_the_search_path_only() {
-        assert!(present("cargo"));
-        assert!(!present("no-such-program"));
+        assert!(Machine::this().has("cargo"));
+        assert!(!Machine::this().has("no-such-program"));
     }
 
     #[test]
     fn nothing_is_installed_where_nothing_is_missing() {
-        let cargo = Tool {
-            program: "cargo",
-            package: "no-such-package",
-            needed_for: "this test",
-        };
-        assert!(tools(&[cargo]).is_ok());
+        let list = format!("echo '{}'", TARGETS.join("\n"));
+        let there = [
+            ("qemu-system-arm", ""),
+            ("rustup", list.as_str()),
+            ROOT,
+            INSTALLS,
+        ];
+        let bare = Bare::new(&there);
+        bare.machine.set_up(TOOLS).unwrap();
+        assert_eq!(bare.log(), "rustup target list --installed\n");
+    }
+
+    #[test]
+    fn a_bare_machine_gets_the_missing_targets_and_the_package() {
+        let bare = Bare::new(&[("rustup", "echo thumbv6m-none-eabi"), ROOT, INSTALLS]);
+        bare.machine.set_up(TOOLS).unwrap();
+        assert_eq!(
+            bare.log(),
+            "rustup target list --installed\n\
+             rustup target add thumbv7em-none-eabihf wasm32-unknown-unknown\n\
+             id -u\n\
+             apt-get update -q\n\
+             apt-get install -q -y --no-install-recommends qemu-system-arm\n"
+        );
+    }
+
+    #[test]
+    fn who_may_not_install_is_told_what_to_install() {
+        for programs in [&[("id", "echo 1000"), INSTALLS][..], &[ROOT]] {
+            let bare = Bare::new(programs);
+            let told = bare.machine.tools(TOOLS).unwrap_err().to_string();
+            assert!(
+                told.ends_with("install with: sudo apt-get install qemu-system-arm"),
+                "{told}"
+            );
+            assert!(!bare.log().contains("apt-get"));
+        }
+    }
+
+    #[test]
+    fn an_installation_that_fails_or_brings_nothing_is_an_error() {
+        for apt in ["[ \"$1\" = update ]", "exit 0", "exit 1"] {
+            let bare = Bare::new(&[ROOT, ("apt-get", apt)]);
+            assert!(bare.machine.tools(TOOLS).is_err(), "{apt}");
+        }
     }
 }

@@ -117,6 +117,15 @@ fn read(bytes: &[u8]) -> Vec<Result<Envelope<Telemetry>, FrameError>> {
 }
 
 #[test]
+fn a_frame_is_stuffed_and_checked_as_published() {
+    // CRC-32/ISO-HDLC of these nine digits is 0xCBF43926, the catalogue's check value. No zero in it: COBS puts the
+    // distance to the closing one in front.
+    let mut buffer = [0; FRAME_BYTES];
+    let frame = encode(b"123456789", &mut buffer).unwrap();
+    assert_eq!(frame, b"\x0e123456789\x26\x39\xf4\xcb\x00");
+}
+
+#[test]
 fn an_oversized_frame_is_reported_once_and_the_next_is_read() {
     let mut bytes = vec![7; 5 * FRAME_BYTES];
     bytes.push(0);

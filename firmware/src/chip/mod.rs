@@ -5,6 +5,7 @@
 
 #![allow(
     unsafe_code,
+    clippy::undocumented_unsafe_blocks,
     reason = "raw register values, each from the section of RM0090 named beside it"
 )]
 
@@ -19,9 +20,9 @@ use muslip_control::board::{Actuators, NotStored, RawSample, Sensors};
 use muslip_control::brake::BrakeOutput;
 use muslip_control::store::Store;
 use muslip_record::Parameters;
-use stm32f4::stm32f405::{ADC1, GPIOB, IWDG, Peripherals, TIM1};
+use stm32f4::stm32f405::{ADC_COMMON, ADC1, GPIOB, IWDG, Peripherals, RCC, TIM1};
 
-use crate::settings::{supply_mv, wait_for};
+use crate::settings::{ADC_DIVIDER_BITS, supply_mv, wait_for};
 use crate::valves::Valves;
 use bridge::Bridge;
 use encoders::Encoders;
@@ -76,7 +77,7 @@ pub fn start(_: &Peripherals) -> Up {
         .csr()
         .modify(|r, w| unsafe { w.bits(r.bits() | 1 << 24) });
     gpio::start(&p.RCC, &p.GPIOA, &p.GPIOB, &p.GPIOC);
-    start_supply(&p.RCC, &p.ADC1);
+    start_supply(&p.RCC, &p.ADC_COMMON, &p.ADC1);
     let valves = Valves::new(outputs::start_pwm(&p.RCC, p.TIM1), DumpPin);
     let mut store = Store::new(ParameterFlash::new(p.FLASH));
     let parameters = store.load().ok().flatten();
@@ -98,10 +99,13 @@ pub fn start(_: &Peripherals) -> Up {
     }
 }
 
-/// ADC1 on channel 10 (PC0), one conversion for each sample (13.13: SMPR1, SQR3, CR2).
-fn start_supply(rcc: &stm32f4::stm32f405::RCC, adc: &ADC1) {
+/// ADC1 on channel 10 (PC0), one conversion for each sample (13.13: CCR, SMPR1, SQR3, CR2).
+fn start_supply(rcc: &RCC, common: &ADC_COMMON, adc: &ADC1) {
     rcc.apb2enr()
         .modify(|r, w| unsafe { w.bits(r.bits() | 1 << 8) });
+    common
+        .ccr()
+        .write(|w| unsafe { w.bits(ADC_DIVIDER_BITS << 16) });
     adc.smpr1().write(|w| unsafe { w.bits(0b111) });
     adc.sqr3().write(|w| unsafe { w.bits(10) });
     adc.cr2().write(|w| unsafe { w.bits(1) });

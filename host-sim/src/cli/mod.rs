@@ -13,6 +13,7 @@ mod predict;
 mod progress;
 mod quarter_car;
 mod rig;
+mod rig_view;
 mod simulate;
 mod terminal;
 

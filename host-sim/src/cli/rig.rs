@@ -1,23 +1,18 @@
 //! `muslip rig`.
 
-use std::io::Write;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
 use clap::{Args, Subcommand};
 use muslip_record::{
-    Command, Estimate, Event, Fault, Parameters, Profile, Program, STEPS, Sample, State, Status,
-    Telemetry,
+    Command, Event, Fault, Parameters, Profile, Program, STEPS, State, Status, Telemetry,
 };
 
 use super::Failure;
-use super::terminal::{Terminal, shows_progress};
+use super::rig_view::{LiveView, Seen};
+use super::terminal::Terminal;
 use crate::input_error::one_line;
-use crate::output::OutputError;
 use crate::rig_link::{Port, Recorder, RigError, Session, parse_parameters, write_parameters};
-
-/// How often the live view is drawn.
-const VIEW: Duration = Duration::from_millis(100);
 
 /// Work a rig: arm it, run a brake profile, record while it runs.
 ///
@@ -295,15 +290,6 @@ fn standing(bits: u32) -> String {
     }
 }
 
-/// What the live view shows.
-#[derive(Default)]
-struct Seen {
-    sample: Option<Sample>,
-    estimate: Option<Estimate>,
-    fault: Option<Fault>,
-    written: Option<OutputError>,
-}
-
 fn record(
     run: &Run,
     profile: Profile,
@@ -315,17 +301,17 @@ fn record(
     session.ask("start", Command::Start { profile }, |_| {})?;
     let mut recorder = Recorder::create(&run.out, &origin)?;
     let mut seen = Seen::default();
-    let mut drawn = Instant::now();
-    let view = shows_progress();
+    let mut view = LiveView::new();
+    let mut written = None;
     loop {
         session.listen(|message| match message {
             Telemetry::Sample(sample) => {
                 seen.sample = Some(*sample);
-                if seen.written.is_none()
+                if written.is_none()
                     && sample.state > State::Armed
                     && let Err(error) = recorder.add(sample)
                 {
-                    seen.written = Some(error);
+                    written = Some(error);
                 }
             }
             Telemetry::Estimate(estimate) => seen.estimate = Some(*estimate),
@@ -335,12 +321,8 @@ fn record(
             } => seen.fault = Some(*fault),
             _ => {}
         })?;
-        if view && drawn.elapsed() > VIEW {
-            drawn = Instant::now();
-            let mut err = anstream::stderr();
-            let _ = write!(err, "\r\x1b[K{}", live(&seen)).and_then(|()| err.flush());
-        }
-        if let Some(error) = seen.written.take() {
+        view.show(&seen);
+        if let Some(error) = written.take() {
             session.ask("stop", Command::Stop, |_| {})?;
             return Err(error.into());
         }
@@ -349,9 +331,7 @@ fn record(
             break;
         }
     }
-    if view {
-        let _ = write!(anstream::stderr(), "\r\x1b[K");
-    }
+    drop(view);
     let (rows, missing) = recorder.counts();
     let (lost, bad) = session.losses();
     terminal.line(&format!(
@@ -378,32 +358,4 @@ fn record(
             "fault {fault:?}: the brake was dumped; the recording is kept. When the cause is gone: muslip rig clear"
         ))),
     }
-}
-
-fn live(seen: &Seen) -> String {
-    let mut line = String::new();
-    if let Some(sample) = seen.sample {
-        line += &format!(
-            "{:?}  v {:6.2} m/s  w {:6.2} rad/s  brake {:3.0} %",
-            sample.state,
-            sample.vehicle_speed_m_s,
-            sample.wheel_speed_rad_s,
-            100.0 * sample.brake_demand
-        );
-    }
-    if let Some(estimate) = seen.estimate {
-        line += &format!(
-            "  slip {:5.3}  mu {:5.3}  peak {:.3}±{:.3} at {:.3}±{:.3}",
-            estimate.slip_ratio,
-            estimate.friction,
-            estimate.peak_friction,
-            estimate.p00.max(0.0).sqrt(),
-            estimate.critical_slip,
-            estimate.p11.max(0.0).sqrt()
-        );
-    }
-    if let Some(fault) = seen.fault {
-        line += &format!("  FAULT {fault:?}");
-    }
-    line
 }

@@ -4,6 +4,7 @@ use std::collections::VecDeque;
 use std::path::Path;
 
 use anyhow::{Result, bail, ensure};
+use muslip_control::board::RawSample;
 use muslip_control::brake::BrakeOutput;
 use muslip_control::emulation::FromFirmware;
 use muslip_record::{
@@ -42,6 +43,8 @@ pub struct Bench {
     pub rig: Rig,
     /// The host.
     pub host: Host,
+    /// What the sensors read last.
+    pub raw: RawSample,
     /// What the valves were told last.
     pub brake: BrakeOutput,
     /// Samples so far.
@@ -73,6 +76,7 @@ impl Bench {
             image_said: (FrameReader::new(), VecDeque::new()),
             rig: Rig::rolling(law, 20.0, seed, &Parameters::default())?,
             host: Host::new(),
+            raw: RawSample::default(),
             brake: BrakeOutput::DUMPED,
             samples: 0,
             estimates_compared: 0,
@@ -89,6 +93,7 @@ impl Bench {
     /// The image is gone, or differs from the native controller.
     pub fn sample(&mut self) -> Result<()> {
         let raw = self.rig.sample(self.brake);
+        self.raw = raw;
         let link = self.host.outgoing()?;
         let input = Input {
             raw,

@@ -20,6 +20,7 @@ pub struct Host {
     expected: Option<u16>,
     open: Option<(u16, Command, u64)>,
     samples: u64,
+    last_word: u64,
     /// Whether it keeps the link alive by itself.
     pub alive: bool,
     keep_alive_samples: u64,
@@ -65,6 +66,7 @@ impl Host {
             expected: None,
             open: None,
             samples: 0,
+            last_word: 0,
             alive: true,
             keep_alive_samples: KEEP_ALIVE_SAMPLES,
             corruption: 0.0,
@@ -96,6 +98,11 @@ impl Host {
         self.open.is_some()
     }
 
+    /// Samples since the last one that it said anything with.
+    pub fn silent_samples(&self) -> u64 {
+        self.samples - self.last_word
+    }
+
     /// Bytes to send before the next sample.
     ///
     /// # Errors
@@ -116,6 +123,9 @@ impl Host {
             bytes.extend_from_slice(encode(&envelope, &mut buffer)?);
         }
         self.samples += 1;
+        if !bytes.is_empty() {
+            self.last_word = self.samples;
+        }
         self.corrupt(&mut bytes);
         Ok(bytes)
     }

@@ -10,6 +10,7 @@
 
 pub mod bench;
 pub mod host;
+pub mod log;
 pub mod native;
 pub mod qemu;
 pub mod rig;

@@ -45,6 +45,7 @@ fn main() -> Result<()> {
     }
     let all: Vec<Scenario<'_>> = vec![
         ("greets", Box::new(|| scenarios::greets(image))),
+        ("log", Box::new(|| scenarios::log(image))),
         ("ramps", Box::new(|| scenarios::ramps(image))),
         ("full lock", Box::new(|| scenarios::full_lock(image))),
         ("steps", Box::new(|| scenarios::steps(image))),

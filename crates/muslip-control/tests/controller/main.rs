@@ -1,0 +1,12 @@
+//! The controller from its samples to its valves: runs, interlocks, link and parameters.
+#![allow(
+    clippy::unwrap_used,
+    clippy::panic,
+    reason = "a failed step fails the test"
+)]
+
+mod bench;
+mod interlocks;
+mod link;
+mod parameters;
+mod runs;

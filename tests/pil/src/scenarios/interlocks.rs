@@ -1,0 +1,187 @@
+//! Every fault that a rig or a link can have, injected while the brake is at work.
+
+use std::path::Path;
+
+use anyhow::{Result, ensure};
+use muslip_control::EDGE_TIMER_HZ;
+use muslip_control::board::BridgeQuality;
+use muslip_control::brake::BrakeOutput;
+use muslip_control::interlock::{LOCK_TIME_S, SILENT_SAMPLES};
+use muslip_record::{Answer, Command, Fault, Parameters, Profile, Program, Refusal, State};
+
+use super::{CYCLES_PER_SAMPLE, Found, LAW, RAMP, most};
+use crate::bench::{Bench, Worst};
+use crate::rig::Trouble;
+
+/// One fault and how it comes about.
+struct Injection {
+    fault: Fault,
+    inject: fn(&mut Bench),
+    /// Whether its condition, as the interlock states it, held at the last sample; judged from what the simulator
+    /// gave, not from what the image said.
+    holds: fn(&Bench) -> bool,
+    /// Samples from the first on which it held to the one that dumped the brake, both counted.
+    samples: u32,
+}
+
+impl Injection {
+    /// A fault whose condition holds from the next sample on, and must dump the brake there.
+    const fn at_once(fault: Fault, inject: fn(&mut Bench)) -> Self {
+        Self {
+            fault,
+            inject,
+            holds: |_| true,
+            samples: 1,
+        }
+    }
+}
+
+fn trouble(bench: &mut Bench, change: impl FnOnce(&mut Trouble)) {
+    change(&mut bench.rig.trouble);
+}
+
+/// All faults that a rig or a link can have; watchdog and clock are what a chip finds when it starts, and are tested
+/// natively.
+fn injections() -> Vec<Injection> {
+    let at_once = Injection::at_once;
+    vec![
+        at_once(Fault::EmergencyStop, |b| {
+            trouble(b, |t| t.emergency_stop = true)
+        }),
+        at_once(Fault::BridgeLost, |b| {
+            trouble(b, |t| t.bridge = BridgeQuality::Bad)
+        }),
+        at_once(Fault::BridgeFrozen, |b| {
+            trouble(b, |t| t.bridge = BridgeQuality::Stale)
+        }),
+        // The fifth time that the codes are the same; the first is the sample before.
+        Injection {
+            samples: 4,
+            ..at_once(Fault::BridgeFrozen, |b| {
+                trouble(b, |t| t.bridge_frozen = true)
+            })
+        },
+        at_once(Fault::BridgeOutOfRange, |b| {
+            trouble(b, |t| t.drag_offset_n = 20_000.0)
+        }),
+        at_once(Fault::NormalForceLost, |b| trouble(b, |t| t.lifted = true)),
+        at_once(Fault::BrownOut, |b| trouble(b, |t| t.supply_v = Some(19.9))),
+        at_once(Fault::WheelSensorLost, |b| {
+            trouble(b, |t| t.wheel_lost = true)
+        }),
+        at_once(Fault::VehicleSensorLost, |b| {
+            trouble(b, |t| t.vehicle_lost = true)
+        }),
+        // 20 more pulses in a millisecond are 250 rad/s.
+        at_once(Fault::Overspeed, |b| {
+            trouble(b, |t| t.extra_wheel_pulses = 20)
+        }),
+        at_once(Fault::WheelSensorOutOfRange, |b| {
+            trouble(b, |t| t.extra_wheel_pulses = 5)
+        }),
+        at_once(Fault::VehicleSensorOutOfRange, |b| {
+            trouble(b, |t| t.extra_vehicle_pulses = 2)
+        }),
+        Injection {
+            holds: |b| b.host.silent_samples() > u64::from(SILENT_SAMPLES),
+            ..at_once(Fault::LinkSilent, |b| b.host.alive = false)
+        },
+        // Burnt in this sample, which only its end can tell: dumped on the next.
+        Injection {
+            samples: 2,
+            ..at_once(Fault::DeadlineMissed, |b| {
+                b.burn = CYCLES_PER_SAMPLE + 1_000
+            })
+        },
+        // A brake that grabs: the wheel needs some 40 ms to stop and may then stand for 200.
+        Injection {
+            holds: |b| {
+                let age_s = f64::from(b.raw.wheel.age_ticks) / f64::from(EDGE_TIMER_HZ);
+                age_s > f64::from(LOCK_TIME_S)
+            },
+            ..at_once(Fault::WheelLocked, |b| {
+                trouble(b, |t| t.stuck_brake_nm = Some(2_500.0))
+            })
+        },
+        // A brake that grabs takes the wheel into the skid range, where a filter that believes in no noise at all
+        // refuses its first update; that comes after the sample's interlocks, so that the next one dumps.
+        Injection {
+            holds: |b| {
+                b.rig.slip_ratio() >= f64::from(Parameters::default().estimator.skid_slip_minimum)
+            },
+            samples: 2,
+            ..at_once(Fault::EstimatorFault, |b| {
+                trouble(b, |t| t.stuck_brake_nm = Some(2_500.0))
+            })
+        },
+    ]
+}
+
+/// Parameters that the filter starts with and fails on.
+fn set_filter_that_fails(bench: &mut Bench) -> Result<()> {
+    let mut parameters = Parameters::default();
+    parameters.estimator.friction_std = 1e-30;
+    bench.run(50)?;
+    let answer = bench.say(Command::SetParameters { parameters })?;
+    // In use, though there is nowhere to store them.
+    ensure!(answer == Answer::Refused(Refusal::Storage), "{answer:?}");
+    Ok(())
+}
+
+/// Every fault dumps the brake on the sample on which its condition holds, and latches.
+pub fn interlocks(image: &Path) -> Result<Found> {
+    let mut worst = Worst::default();
+    let mut lines = Vec::new();
+    for injection in injections() {
+        let fault = injection.fault;
+        let mut bench = Bench::start(image, LAW, 4)?;
+        if fault == Fault::EstimatorFault {
+            set_filter_that_fails(&mut bench)?;
+        }
+        // The skid that ends a ramp would end a lock as well.
+        bench.begin(Profile {
+            program: Program::Ramp { demand_per_s: 0.2 },
+            skid_slip: 1.0,
+            ..RAMP
+        })?;
+        bench.until(State::Ramp, 1_000)?;
+        bench.run(200)?;
+        ensure!(
+            bench.brake.hold_pressure,
+            "{fault:?}: the brake is not at work"
+        );
+        (injection.inject)(&mut bench);
+        let (mut all, mut held) = (0, 0);
+        while bench.brake.hold_pressure {
+            bench.sample()?;
+            bench.burn = 0;
+            all += 1;
+            held += u32::from(held > 0 || (injection.holds)(&bench));
+            ensure!(all < 500, "{fault:?}: the brake is not dumped");
+        }
+        ensure!(bench.brake == BrakeOutput::DUMPED);
+        bench.rig.trouble = Trouble::default();
+        bench.host.alive = true;
+        bench.run(50)?;
+        ensure!(bench.brake == BrakeOutput::DUMPED, "the dump does not last");
+        bench.must(Command::ReadStatus)?;
+        let latched = bench.host.heard.status.and_then(|status| status.fault);
+        ensure!(
+            latched == Some(fault),
+            "{fault:?} injected, {latched:?} latched"
+        );
+        ensure!(
+            held == injection.samples,
+            "{fault:?}: dumped after {held} samples of its condition, {all} after its cause"
+        );
+        lines.push(format!("{fault:?} {held} ({all})"));
+        worst = most(worst, bench.worst);
+    }
+    Ok(Found {
+        line: format!(
+            "samples from the condition (from its cause) to the dump: {}",
+            lines.join(", ")
+        ),
+        worst,
+    })
+}

@@ -1,0 +1,62 @@
+//! What the image must do, one scenario each; an error says what is not as it must be.
+#![expect(
+    clippy::missing_errors_doc,
+    reason = "every scenario's error is its finding"
+)]
+
+mod chip;
+mod interlocks;
+mod link;
+mod runs;
+
+use muslip_record::{Profile, Program};
+
+use crate::bench::{Bench, Worst};
+
+pub use chip::{endurance, fault_handlers, free_run, log};
+pub use interlocks::interlocks;
+pub use link::{back_pressure, corruption, greets};
+pub use runs::{full_lock, ramps, slip_hold, steps};
+
+/// Cycles that a sample has at 168 MHz.
+pub const CYCLES_PER_SAMPLE: u32 = 168_000;
+/// Share of them that the sampling interrupt and the work of a sample may take, in per cent.
+pub const WORK_PERCENT: u32 = 20;
+/// The road of all scenarios that do not say another.
+const LAW: &str = "rudd:0.85,0.14";
+
+const RAMP: Profile = Profile {
+    program: Program::Ramp { demand_per_s: 0.8 },
+    start_speed_m_s: 15.0,
+    skid_slip: 0.5,
+    skid_hold_s: 0.05,
+    applications: 2,
+    cool_s: 0.3,
+};
+
+/// What a scenario found, in one line; and the most that anything took.
+pub struct Found {
+    /// For people.
+    pub line: String,
+    /// For the budgets.
+    pub worst: Worst,
+}
+
+fn found(bench: &Bench, line: String) -> Found {
+    Found {
+        line,
+        worst: bench.worst,
+    }
+}
+
+/// The larger of each.
+pub fn most(a: Worst, b: Worst) -> Worst {
+    let mut instructions = a.instructions;
+    for (most, other) in instructions.iter_mut().zip(b.instructions) {
+        *most = (*most).max(other);
+    }
+    Worst {
+        instructions,
+        stack_bytes: a.stack_bytes.max(b.stack_bytes),
+    }
+}
