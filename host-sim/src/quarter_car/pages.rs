@@ -52,18 +52,20 @@ const ABOUT_UNKNOWN: &str = "What (f) needs. Four channels: nothing but their re
     the search here, which it would not on a road with another peak. Wheel speed alone: that the road is one \
     of the bank's three, and the mass to about 5 % (why, below the Monte Carlo).";
 
-const ABOUT_MASS: &str = "Why an unknown mass spoils wheel speed alone in the worst tenth: of friction and mass the \
-    wheel's equation holds the product alone, and vehicle speed, which friction moves without the mass, reaches the \
-    wheel through the slope of the curve, which is zero where the controller wants to be (two directions of five \
-    are seen with the road unknown, see below). At the peak a car on dry asphalt reads like one 1.46 times as \
-    heavy on wet asphalt, that being the ratio of 1.17 and 0.80. So there the prior on mass alone tells the two \
-    roads apart, and only where it excludes such a pair: (1 + d)/(1 − d) < 1.46, a mass known to 18.7 %. Snow, 4.2 \
-    times below wet, is always told. What decides within ±30 % is the short rise below the peak, where the curves' \
-    shapes differ, and it is noisy. Tried: the same bank with an honest prior (78 kg, the spread of ±30 %). It is \
-    worse, in the median too, for every road is then free to explain the readings by a mass of its own; the \
-    narrow prior is wrong about the mass, but keeps the roads apart. Short releases of the brake that probe \
-    for the vehicle's speed were tried before and did not help. What does help is a weighed car, or any of \
-    the rig's other channels.";
+const ABOUT_MASS: &str = "Why an unknown mass spoils wheel speed alone in the worst tenth: of friction and mass the wheel's \
+    equation holds the product alone, and vehicle speed, which friction moves without the mass, reaches \
+    the wheel through the slope of the curve, which is zero where the controller wants to be (two \
+    directions of five are seen with the road unknown, see below). At the peak a car on dry asphalt \
+    reads like one 1.46 times as heavy on wet asphalt, that being the ratio of 1.17 and 0.80. So there \
+    the prior on mass alone tells the two roads apart, and only where it excludes such a pair: (1 + \
+    d)/(1 − d) < 1.46, a mass known to 18.7 %. Snow, 4.2 times below wet, is always told. What decides \
+    within ±30 % is the short rise below the peak, where the curves' shapes differ, and it is noisy. \
+    Tried: the same bank with an honest prior (78 kg, the spread of ±30 %). On wet asphalt and snow it \
+    is a little better, on dry asphalt and through the step its median more than doubles, for every road \
+    is then free to explain the readings by a mass of its own; the narrow prior is wrong about the mass, \
+    but keeps the roads apart. Short releases of the brake that probe for the vehicle's speed were tried \
+    before and did not help. What does help is a weighed car, vehicle speed or normal force; drag is the \
+    same product again.";
 
 const ABOUT_TUNING: &str = "Tuned by hand on stops from 30 m/s, seeds 1 and 5000 to 5099 with vehicles drawn \
     by seeds 1000 to 1099: Q of the tuned filter was written down from what each equation leaves out and \
