@@ -110,10 +110,38 @@ pub fn required(limits: &Limits, count: usize, explained: f64) -> f64 {
         .max(limits.form_misfit * explained)
 }
 
+/// Share of the deceleration, root mean square, that the drag must account for to say anything of the mass.
+const DRAG_SHARE: f64 = 0.1;
+
+/// Whether the vehicle balance weighs mass against drag: without drag any mass goes with some other force.
+fn drag_slows(joint: &Joint<'_>) -> bool {
+    joint
+        .parts
+        .iter()
+        .filter(|part| part.balance == Balance::Vehicle)
+        .all(|part| {
+            let data = part.data;
+            let (mut drag, mut inertia) = (0.0, 0.0);
+            for &run in part.runs {
+                let series = &data.series[run];
+                for k in part.segments(run).iter().flat_map(Clone::clone) {
+                    if let Some(reading) = series.drag.get(k) {
+                        drag += reading * reading;
+                    }
+                    inertia += (data.context.mass * series.speed.rate[k]).powi(2);
+                }
+            }
+            drag > DRAG_SHARE * DRAG_SHARE * inertia
+        })
+}
+
 /// Whether an entry can show in these balances (force gain acts on wheel and vehicle alike).
 #[must_use]
 pub fn belongs(joint: &Joint<'_>, entry: usize) -> bool {
     let mechanism = joint.data().catalogue.get(entry);
+    if matches!(mechanism.id(), Id::VehicleInertia | Id::ForceGain) && !drag_slows(joint) {
+        return false;
+    }
     joint.parts.iter().any(|part| match part.balance {
         Balance::Tyre => mechanism.stage() <= Stage::Chain,
         Balance::Wheel => mechanism.stage() == Stage::Wheel || mechanism.id() == Id::ForceGain,
@@ -164,6 +192,42 @@ type Extended = (Model, f64, Vec<Vec<f64>>);
 
 /// Starts kept for later rounds.
 const KEPT_STARTS: usize = 3;
+/// Single mechanisms that are fitted whatever the best of them promises.
+const FIRST_FITS: usize = 12;
+/// Share of the best promise from which a single mechanism is fitted, too.
+const FITTED_SHARE: f64 = 0.25;
+/// Steps of a fit before it is compared with the others.
+const FIRST_STEPS: usize = 4;
+/// Steps of those that are then still in reach of the best.
+const LAST_STEPS: usize = 11;
+
+/// How far behind the best of its size a set may lie to be led further, in nats.
+fn reach(explained: f64) -> f64 {
+    40.0 + 0.5 * explained.max(0.0)
+}
+
+/// Fits all a few steps, and those in reach of the best to the end.
+fn fitted_in_turn(joint: &Joint<'_>, models: Vec<Model>, reference: f64) -> Vec<Candidate> {
+    let begun: Vec<Candidate> = models
+        .par_iter()
+        .map(|model| candidate(joint, joint.fit(model, FIRST_STEPS)))
+        .collect();
+    let best = begun
+        .iter()
+        .map(|c| c.criterion)
+        .fold(f64::INFINITY, f64::min);
+    let last = best + reach(reference - best);
+    begun
+        .into_par_iter()
+        .map(|one| {
+            if one.criterion <= last {
+                candidate(joint, joint.fit(&one.fitted.model, LAST_STEPS))
+            } else {
+                one
+            }
+        })
+        .collect()
+}
 
 /// A model with one more mechanism, at the start from which one step is predicted to gain most, with
 /// the loss predicted there; and all starts in that order.
@@ -267,9 +331,12 @@ fn extend(
                     &data.series,
                     &evidences[place],
                 );
-                &looked
+                looked.as_slice()
+            } else if place == 0 {
+                own.as_slice()
             } else {
-                own
+                // What is led further beside the best is there in case of a wrong turn, not to be searched again.
+                &own[..1]
             };
             let (model, predicted, order) = extended(
                 joint,
@@ -296,23 +363,30 @@ fn extend(
         }
     }
     promising.sort_by(|a, b| a.1.total_cmp(&b.1));
-    if !first {
-        // A step promises too much or too little where the effect is strong; several are fitted.
-        promising.truncate(5 * beam.len().max(1));
-    }
-    let fits: Vec<Candidate> = promising
-        .par_iter()
-        .map(|(model, _)| candidate(joint, joint.fit(model, 15)))
-        .collect();
-    keep_best(fits)
+    // A step promises too much or too little where the effect is strong; several are fitted.
+    let most = if first {
+        FIRST_FITS
+    } else {
+        3 * beam.len().max(1)
+    };
+    let reference = beam[0].criterion;
+    let share = promising
+        .first()
+        .map_or(0.0, |best| FITTED_SHARE * (reference - best.1));
+    let mut rank = 0;
+    promising.retain(|(_, promised)| {
+        rank += 1;
+        rank <= most || (first && reference - promised >= share)
+    });
+    let models = promising.into_iter().map(|(model, _)| model).collect();
+    keep_best(fitted_in_turn(joint, models, reference))
 }
 
 /// Members of a level that are close enough to its best to be led further.
 fn beam_of(level: &[Candidate], explained: f64, limits: &Limits) -> Vec<Candidate> {
-    let reach = 40.0 + 0.5 * explained;
     level
         .iter()
-        .filter(|c| c.criterion - level[0].criterion <= reach)
+        .filter(|c| c.criterion - level[0].criterion <= reach(explained))
         .take(limits.beam)
         .cloned()
         .collect()

@@ -273,7 +273,7 @@ impl Outcome<'_> {
             let price = crate::choose::price(&fitted.model, search.count)
                 - crate::choose::price(&without.model, search.count);
             let gain = (proof.loss(&without.model) - with_all) / proof_count;
-            let reported = figures(data, search, &fitted.model, covariance, place);
+            let reported = figures(data, &fitted.model, covariance, place);
             let confidence = membership.get(&id).copied().unwrap_or(0.0);
             // A name that does not predict data that it has not seen is no explanation.
             let confidence = if mechanism.predicts() && gain < 0.0 {

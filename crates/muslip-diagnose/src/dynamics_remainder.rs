@@ -6,11 +6,12 @@ use rayon::prelude::*;
 use crate::choose::{Limits, required};
 use crate::data::Data;
 use crate::fit::{Joint, Problem};
+use crate::lines;
 use crate::mechanism::Balance;
 use crate::model::Model;
 use crate::noise::robust_sigma;
-use crate::omnibus::{Column, Found, Regression, Variable, hat, knots};
-use crate::validation::{EFFECT_SPAN_S, LEAST_EFFECT};
+use crate::omnibus::{Column, Found, Regression, Variable, hats, knots};
+use crate::size::{LEAST_EFFECT, means, root_mean_square};
 
 /// A dependence of one balance on one variable.
 #[derive(Clone, Debug)]
@@ -79,7 +80,9 @@ fn of_balance(part: &Problem<'_>, model: &Model, limits: &Limits) -> Vec<Dynamic
     if part.balance == Balance::Wheel {
         jobs.push((None, Lever::Brake));
     }
-    let sigma = typical(part, model);
+    let sigma = robust_sigma(&means(part, |run| {
+        part.residual(model, &model.vector(), run)
+    }));
     let count = part.count();
     jobs.par_iter()
         .filter_map(|(variable, lever)| {
@@ -98,7 +101,8 @@ fn of_balance(part: &Problem<'_>, model: &Model, limits: &Limits) -> Vec<Dynamic
                 fit.gain - price
             };
             let worth = (fit.gain - price).min(held_out);
-            let large = size(part, &effect) >= LEAST_EFFECT * sigma;
+            let size = root_mean_square(&means(part, |run| effect[run].clone()));
+            let large = size >= LEAST_EFFECT * sigma;
             (worth.is_finite() && large && worth >= required(limits, count, 0.0)).then(|| {
                 DynamicRemainder {
                     balance: part.balance,
@@ -135,64 +139,25 @@ fn spline(part: &Problem<'_>, variable: &Variable, acts: Lever) -> Option<Vec<Co
         .map(|run| variable.values(data, run))
         .collect();
     let knots = knots(part, &values, KNOTS);
-    if knots.len() < 2 {
-        return None;
-    }
-    let columns = (0..knots.len())
-        .map(|c| {
-            values
-                .iter()
-                .enumerate()
-                .map(|(run, u)| {
-                    u.iter()
-                        .enumerate()
-                        .map(|(k, u)| {
-                            let h = match hat(&knots, *u) {
-                                Some((at, w)) if at == c => 1.0 - w,
-                                Some((at, w)) if at + 1 == c => w,
-                                _ => 0.0,
-                            };
-                            let x = h * lever(data, part.balance, acts, run, k);
-                            if x.is_finite() { x } else { 0.0 }
-                        })
-                        .collect()
-                })
-                .collect()
+    (knots.len() >= 2).then(|| {
+        hats(&knots, &values, &|run, k| {
+            lever(data, part.balance, acts, run, k)
         })
-        .collect();
-    Some(columns)
+    })
 }
 
 /// First two orders of the wheel's angle, with a phase of their own in each run.
 fn once_a_revolution(part: &Problem<'_>, acts: Lever) -> Vec<Column> {
     let data = part.data;
-    let mut columns = Vec::new();
-    for own in part.runs {
-        for order in [1.0, 2.0] {
-            for quadrature in [false, true] {
-                columns.push(
-                    data.series
-                        .iter()
-                        .enumerate()
-                        .map(|(run, s)| {
-                            (0..s.len())
-                                .map(|k| {
-                                    if run != *own {
-                                        return 0.0;
-                                    }
-                                    let (sin, cos) = (order * s.angle[k]).sin_cos();
-                                    let x = lever(data, part.balance, acts, run, k)
-                                        * if quadrature { sin } else { cos };
-                                    if x.is_finite() { x } else { 0.0 }
-                                })
-                                .collect()
-                        })
-                        .collect(),
-                );
-            }
-        }
-    }
-    columns
+    let lever = |run: usize, k: usize| lever(data, part.balance, acts, run, k);
+    [1.0, 2.0]
+        .into_iter()
+        .flat_map(|order| {
+            lines::columns(part, order, &lever, &|run| {
+                lines::phase_of(data, "wheel_angle_rad", run)
+            })
+        })
+        .collect()
 }
 
 fn summed(columns: &[Column], fit: &Found) -> Column {
@@ -208,32 +173,4 @@ fn summed(columns: &[Column], fit: &Found) -> Column {
         }
     }
     sum
-}
-
-/// Means over [`EFFECT_SPAN_S`] of a column on the stretches of a problem.
-fn means(part: &Problem<'_>, of: &dyn Fn(usize) -> Vec<f64>) -> Vec<f64> {
-    let mut out = Vec::new();
-    for &run in part.runs {
-        let column = of(run);
-        let length = ((EFFECT_SPAN_S / part.data.series[run].typical_dt) as usize).max(1);
-        for segment in part.segments(run) {
-            out.extend(
-                column[segment.clone()]
-                    .chunks_exact(length)
-                    .map(|c| c.iter().sum::<f64>() / length as f64),
-            );
-        }
-    }
-    out
-}
-
-fn typical(part: &Problem<'_>, model: &Model) -> f64 {
-    robust_sigma(&means(part, &|run| {
-        part.residual(model, &model.vector(), run)
-    }))
-}
-
-fn size(part: &Problem<'_>, effect: &Column) -> f64 {
-    let all = means(part, &|run| effect[run].clone());
-    (all.iter().map(|x| x * x).sum::<f64>() / all.len().max(1) as f64).sqrt()
 }

@@ -356,12 +356,7 @@ impl Joint<'_> {
                     damping *= 10.0;
                     continue;
                 };
-                let trial: Vec<f64> = p
-                    .iter()
-                    .zip(step.iter())
-                    .zip(&bounds)
-                    .map(|((x, d), (low, high))| (x + d).clamp(*low, *high))
-                    .collect();
+                let trial = moved(&p, step.as_slice(), 1.0, &bounds);
                 let candidate = start.with(&trial);
                 let value = self.loss(&candidate);
                 if value.is_finite() && value < loss {
@@ -463,16 +458,11 @@ impl Joint<'_> {
         let bounds = self.bounds(model);
         match bounded_step(&information, &gradient, 1e-6, &p, &bounds) {
             Some(step) => {
-                let limited = DVector::from_iterator(
-                    p.len(),
-                    p.iter()
-                        .zip(step.iter())
-                        .zip(&bounds)
-                        .map(|((x, d), (low, high))| (x + d).clamp(*low, *high) - x),
-                );
+                let moved = moved(&p, step.as_slice(), 1.0, &bounds);
+                let limited =
+                    DVector::from_iterator(p.len(), moved.iter().zip(&p).map(|(x, from)| x - from));
                 let predicted =
                     total + gradient.dot(&limited) + 0.5 * limited.dot(&(&information * &limited));
-                let moved = p.iter().zip(limited.iter()).map(|(x, d)| x + d).collect();
                 (predicted, moved)
             }
             None => (total, p),
@@ -504,6 +494,16 @@ pub fn dot(a: &[f64], b: &[f64]) -> f64 {
     }
     rest += lanes[0] + lanes[1] + lanes[2] + lanes[3];
     rest
+}
+
+/// Parameters moved by a share of a step, held inside their bounds.
+#[must_use]
+pub fn moved(p: &[f64], step: &[f64], share: f64, bounds: &[(f64, f64)]) -> Vec<f64> {
+    p.iter()
+        .zip(step)
+        .zip(bounds)
+        .map(|((x, d), (low, high))| (x + share * d).clamp(*low, *high))
+        .collect()
 }
 
 /// Damped Gauss-Newton step; parameters pushed against a bound are held there and the rest solved again.

@@ -53,6 +53,7 @@ pub mod remainder;
 pub mod repaired;
 pub mod saturated;
 pub mod separating;
+mod size;
 pub mod smooth;
 pub mod split;
 pub mod tyre_stage;

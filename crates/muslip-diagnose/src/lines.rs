@@ -2,7 +2,7 @@
 
 use crate::data::Data;
 use crate::fit::Problem;
-use crate::omnibus::{Action, Column};
+use crate::omnibus::{Action, Column, finite_or_zero};
 use crate::smooth::median_in_place;
 
 /// Where lines are looked for: the variable's word, and how they act.
@@ -48,32 +48,66 @@ pub fn columns(
     lever: &dyn Fn(usize, usize) -> f64,
     phase: &dyn Fn(usize) -> Vec<f64>,
 ) -> Vec<Column> {
-    let series = &problem.data.series;
     let mut columns: Vec<Column> = Vec::new();
     for own in problem.runs {
-        let at = phase(*own);
-        for quadrature in [false, true] {
+        let [cosine, sine] = quadratures(rate, *own, lever, &phase(*own));
+        for wave in [cosine, sine] {
             columns.push(
-                series
+                problem
+                    .data
+                    .series
                     .iter()
                     .enumerate()
                     .map(|(run, s)| {
-                        if run != *own {
-                            return vec![0.0; s.len()];
+                        if run == *own {
+                            wave.clone()
+                        } else {
+                            vec![0.0; s.len()]
                         }
-                        at.iter()
-                            .enumerate()
-                            .map(|(k, u)| {
-                                let (sin, cos) = (rate * u).sin_cos();
-                                lever(run, k) * if quadrature { sin } else { cos }
-                            })
-                            .collect()
                     })
                     .collect(),
             );
         }
     }
     columns
+}
+
+/// The same with one phase for all runs.
+#[must_use]
+pub fn common_columns(
+    problem: &Problem<'_>,
+    rate: f64,
+    lever: &dyn Fn(usize, usize) -> f64,
+    phase: &dyn Fn(usize) -> Vec<f64>,
+) -> [Column; 2] {
+    let mut both = [Column::new(), Column::new()];
+    for run in 0..problem.data.series.len() {
+        for (column, wave) in both
+            .iter_mut()
+            .zip(quadratures(rate, run, lever, &phase(run)))
+        {
+            column.push(wave);
+        }
+    }
+    both
+}
+
+/// Cosine and sine of a line on one run.
+fn quadratures(
+    rate: f64,
+    run: usize,
+    lever: &dyn Fn(usize, usize) -> f64,
+    at: &[f64],
+) -> [Vec<f64>; 2] {
+    at.iter()
+        .enumerate()
+        .map(|(k, u)| {
+            let (sin, cos) = (rate * u).sin_cos();
+            let lever = lever(run, k);
+            (finite_or_zero(lever * cos), finite_or_zero(lever * sin))
+        })
+        .unzip::<f64, f64, Vec<f64>, Vec<f64>>()
+        .into()
 }
 
 /// The rate at which a residual, seen through a lever, has most power over all runs: by fast Fourier transform on a

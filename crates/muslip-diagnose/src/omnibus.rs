@@ -207,6 +207,42 @@ pub fn hat(knots: &[f64], u: f64) -> Option<(usize, f64)> {
     Some((at, (u - knots[at]) / (knots[at + 1] - knots[at])))
 }
 
+/// One column for each hat function of a variable, times a lever; zero where either is not finite.
+#[must_use]
+pub fn hats(
+    knots: &[f64],
+    values: &[Vec<f64>],
+    lever: &dyn Fn(usize, usize) -> f64,
+) -> Vec<Column> {
+    (0..knots.len())
+        .map(|c| {
+            values
+                .iter()
+                .enumerate()
+                .map(|(run, u)| {
+                    u.iter()
+                        .enumerate()
+                        .map(|(k, u)| {
+                            let height = match hat(knots, *u) {
+                                Some((at, w)) if at == c => 1.0 - w,
+                                Some((at, w)) if at + 1 == c => w,
+                                _ => return 0.0,
+                            };
+                            finite_or_zero(height * lever(run, k))
+                        })
+                        .collect()
+                })
+                .collect()
+        })
+        .collect()
+}
+
+/// A sample without a usable input takes no part in a column.
+#[must_use]
+pub fn finite_or_zero(x: f64) -> f64 {
+    if x.is_finite() { x } else { 0.0 }
+}
+
 /// Knots at quantiles of the variable where samples are used; fewer where values repeat.
 #[must_use]
 pub fn knots(problem: &Problem<'_>, values: &[Vec<f64>], count: usize) -> Vec<f64> {
@@ -320,32 +356,7 @@ pub fn group(
     if knots.len() < 2 {
         return None;
     }
-    let columns = (0..knots.len())
-        .map(|c| {
-            values
-                .iter()
-                .enumerate()
-                .map(|(run, u)| {
-                    u.iter()
-                        .enumerate()
-                        .map(|(k, u)| match hat(&knots, *u) {
-                            Some((at, w)) => {
-                                let h = if at == c {
-                                    1.0 - w
-                                } else if at + 1 == c {
-                                    w
-                                } else {
-                                    0.0
-                                };
-                                h * levers.of(data, action, run, k)
-                            }
-                            None => 0.0,
-                        })
-                        .collect()
-                })
-                .collect()
-        })
-        .collect();
+    let columns = hats(&knots, &values, &|run, k| levers.of(data, action, run, k));
     Some(Group {
         variable: Some(variable.clone()),
         action,

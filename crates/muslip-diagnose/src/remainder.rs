@@ -8,7 +8,7 @@ use crate::fit::Problem;
 use crate::lines::{self, Line, PLACES, phase_of, strongest};
 use crate::mechanism::Id;
 use crate::model::Model;
-use crate::omnibus::{Action, Column, Group, Levers, Regression, Variable, group};
+use crate::omnibus::{Action, Column, Found, Group, Levers, Regression, Variable, group};
 use crate::repaired::Correction;
 
 /// An empirical dependence on one variable.
@@ -144,6 +144,9 @@ fn periodic(problem: &Problem<'_>, regression: &Regression, levers: &Levers) -> 
             let sum: f64 = fit.coefficients.iter().map(|c| c * c).sum();
             (sum / problem.runs.len() as f64).sqrt()
         };
+        let common = (word == "distance_m")
+            .then(|| same_everywhere(problem, regression, rate, &lever, &phase, &fit))
+            .flatten();
         let form = match word {
             "time_s" => format!(
                 "{:.4} * sin(2 pi {:.3} Hz t + phase of the run)",
@@ -170,13 +173,54 @@ fn periodic(problem: &Problem<'_>, regression: &Regression, levers: &Levers) -> 
                 form,
                 knots: Vec::new(),
                 values: Vec::new(),
-                // The phase of a run that was not fitted is unknown: nothing to carry over.
-                harmonics: Vec::new(),
+                // Where every run has a phase of its own, that of a run that was not fitted is unknown: nothing to
+                // carry over.
+                harmonics: common.iter().map(|(harmonic, _)| *harmonic).collect(),
             },
-            own: fit.own,
+            own: common.map_or(fit.own, |(_, own)| own),
         });
     }
     found
+}
+
+/// Share of the gain with a phase for each run that one phase for all of them must reach.
+const COMMON_SHARE: f64 = 0.8;
+/// Rates tried on either side of the spectrum's, in sixteenths of a period over the longest run.
+const FINER: i32 = 8;
+
+/// A wave of the track lies at the same place in every run: its rate with one cosine and sine for all of them, and
+/// the steps of the model's own parameters that go with it.
+fn same_everywhere(
+    problem: &Problem<'_>,
+    regression: &Regression,
+    rate: f64,
+    lever: &dyn Fn(usize, usize) -> f64,
+    phase: &dyn Fn(usize) -> Vec<f64>,
+    free: &Found,
+) -> Option<([f64; 3], Vec<f64>)> {
+    let span = problem
+        .runs
+        .iter()
+        .filter_map(|run| phase(*run).last().copied())
+        .fold(0.0, f64::max);
+    let finest = core::f64::consts::TAU / (16.0 * span);
+    (-FINER..=FINER)
+        .map(|step| rate + f64::from(step) * finest)
+        .map(|rate| {
+            let columns = lines::common_columns(problem, rate, lever, phase);
+            (
+                rate,
+                regression.on(problem, &columns.iter().collect::<Vec<_>>()),
+            )
+        })
+        .filter(|(_, found)| found.rank == 2 && found.gain >= COMMON_SHARE * free.gain)
+        .max_by(|a, b| a.1.gain.total_cmp(&b.1.gain))
+        .map(|(rate, found)| {
+            (
+                [rate, found.coefficients[0], found.coefficients[1]],
+                found.own,
+            )
+        })
 }
 
 fn count_lines(problem: &Problem<'_>) -> usize {

@@ -4,11 +4,11 @@ use crate::campaign::Run;
 use crate::choose::{Candidate, Limits, Search, refine, required, search};
 use crate::data::Data;
 use crate::dynamics_stage::CrossEvidence;
-use crate::fit::{BalanceNoise, Fitted, Joint, Problem};
+use crate::fit::{BalanceNoise, Fitted, Joint, Problem, moved};
 use crate::mechanism::{Balance, Stage};
 use crate::model::{Model, TYRE_BASE, tyre};
 use crate::noise::loss;
-use crate::omnibus::Levers;
+use crate::omnibus::{Action, Levers};
 use crate::otherwise::Otherwise;
 use crate::remainder::{Remainder, applied, candidates, counterparts};
 use crate::saturated::{self, Slow};
@@ -257,7 +257,7 @@ fn remainders(
             if top.worth(count) >= required(limits, count, 2.0 * explained) {
                 unexplained.push(top.clone());
                 corrections.push(top.clone());
-            } else if top.variable.is_some() {
+            } else if top.correction.carries() {
                 corrections.push(top.clone());
             }
         }
@@ -292,6 +292,42 @@ const STEPS: [f64; 3] = [1.0, 0.6, 0.3];
 /// Share of the promised gain that the corrected model must keep.
 const KEPT_PROMISE: f64 = 0.33;
 
+/// The same dependence with its mean moved into the base law's parameter that does the same: outside its domain, and
+/// where its column is missing, the base law alone must be right on average.
+fn about_its_mean(problem: &Problem<'_>, model: &Model, remainder: &Remainder) -> Remainder {
+    let mut moved = remainder.clone();
+    let place = match Action::parse(&remainder.correction.acts_on) {
+        Some(Action::Friction) => 0,
+        Some(Action::CriticalSlip) => 1,
+        _ => return moved,
+    };
+    let fixed = problem.data.rig.law_fixed;
+    if fixed || remainder.correction.knots.is_empty() {
+        return moved;
+    }
+    let levers = Levers::new(problem.data, model);
+    let added = applied(problem.data, &levers, remainder);
+    let lever = |run: usize, k: usize| match place {
+        0 => levers.force[run][k],
+        _ => levers.critical[run][k],
+    };
+    let (mut product, mut square) = (0.0, 0.0);
+    for &run in problem.runs {
+        for k in problem.segments(run).iter().flat_map(Clone::clone) {
+            product += added[run][k] * lever(run, k);
+            square += lever(run, k).powi(2);
+        }
+    }
+    let mean = product / square;
+    if mean.is_finite() {
+        moved.own[place] += mean;
+        for value in &mut moved.correction.values {
+            *value -= mean;
+        }
+    }
+    moved
+}
+
 /// The model's own parameters step along with the correction that they were regressed with, as far as the
 /// linearisation holds; `None` where it does not.
 fn corrected(
@@ -300,24 +336,16 @@ fn corrected(
     remainder: &Remainder,
 ) -> Option<(Model, Remainder)> {
     let problem = &joint.parts[0];
+    let remainder = &about_its_mean(problem, &fitted.model, remainder);
     let bounds = joint.bounds(&fitted.model);
     let before: f64 = problem.losses(&fitted.model).iter().sum();
     STEPS
         .iter()
         .map(|share| {
-            let moved: Vec<f64> = fitted
-                .model
-                .vector()
-                .iter()
-                .zip(&remainder.own)
-                .zip(&bounds)
-                .map(|((x, d), (low, high))| (x + share * d).clamp(*low, *high))
-                .collect();
+            let moved = moved(&fitted.model.vector(), &remainder.own, *share, &bounds);
             let model = fitted.model.with(&moved);
             let mut amended = remainder.clone();
-            for value in &mut amended.correction.values {
-                *value *= share;
-            }
+            amended.correction.scale(*share);
             let levers = Levers::new(problem.data, &model);
             let added = applied(problem.data, &levers, &amended);
             let after: f64 = problem
@@ -339,8 +367,8 @@ fn corrected(
         })
         .max_by(|a, b| a.0.total_cmp(&b.0))
         .filter(|(gain, ..)| {
-            // A periodic dependence carries nothing over to other runs.
-            remainder.variable.is_none() || *gain >= KEPT_PROMISE * remainder.gain
+            // A phase of each run's own carries nothing over to other runs.
+            !remainder.correction.carries() || *gain >= KEPT_PROMISE * remainder.gain
         })
         .map(|(_, model, amended)| (model, amended))
 }

@@ -5,8 +5,9 @@ use rayon::prelude::*;
 use nalgebra::{DMatrix, DVector};
 
 use crate::choose::{Limits, Search, candidate, price, required};
-use crate::fit::{Fitted, Joint, bounded_step};
+use crate::fit::{Fitted, Joint, bounded_step, moved};
 use crate::noise::robust_sigma;
+use crate::size::{LEAST_EFFECT, means, root_mean_square};
 
 /// Fewest runs with which leaving one out says anything.
 const FEWEST_RUNS: usize = 3;
@@ -55,12 +56,7 @@ fn left_out(joint: &Joint<'_>, fitted: &Fitted) -> Vec<f64> {
                 &bounds,
             );
             let moved: Vec<f64> = match step {
-                Some(step) => p
-                    .iter()
-                    .zip(step.iter())
-                    .zip(&bounds)
-                    .map(|((x, d), (low, high))| (x + d).clamp(*low, *high))
-                    .collect(),
+                Some(step) => moved(&p, step.as_slice(), 1.0, &bounds),
                 None => p.clone(),
             };
             joint.loss_of(&model.with(&moved), run)
@@ -68,42 +64,23 @@ fn left_out(joint: &Joint<'_>, fitted: &Fitted) -> Vec<f64> {
         .collect()
 }
 
-/// Span over which a balance's residual is averaged to say how large an effect is beside the noise, in s.
-pub const EFFECT_SPAN_S: f64 = 0.05;
-/// Smallest effect on wheel or vehicle worth naming, root mean square, in standard deviations of such means. The
-/// slow noise there is so small that effects far below anything that matters would be significant.
-pub const LEAST_EFFECT: f64 = 0.15;
-
-/// Root mean square of what a mechanism changes, over the noise of means over [`EFFECT_SPAN_S`]; in the balance where
-/// it is largest.
+/// Root mean square of what a mechanism changes, over the noise; in the balance where it is largest.
 fn effect(joint: &Joint<'_>, full: &Fitted, fewer: &Fitted) -> f64 {
     joint
         .parts
         .iter()
         .map(|part| {
-            let (mut change, mut noise, mut count) = (0.0, Vec::new(), 0.0);
-            for &run in part.runs {
-                let with = part.residual(&full.model, &full.model.vector(), run);
-                let without = part.residual(&fewer.model, &fewer.model.vector(), run);
-                let length = ((EFFECT_SPAN_S / part.data.series[run].typical_dt) as usize).max(1);
-                for segment in part.segments(run) {
-                    for (a, b) in with[segment.clone()]
-                        .chunks_exact(length)
-                        .zip(without[segment.clone()].chunks_exact(length))
-                    {
-                        let mean = |x: &[f64]| x.iter().sum::<f64>() / length as f64;
-                        change += (mean(b) - mean(a)).powi(2);
-                        noise.push(mean(a));
-                        count += 1.0;
-                    }
-                }
-            }
-            let sigma = robust_sigma(&noise);
-            if count > 0.0 && sigma > 0.0 {
-                (change / count).sqrt() / sigma
-            } else {
-                0.0
-            }
+            let of =
+                |fitted: &Fitted, run| part.residual(&fitted.model, &fitted.model.vector(), run);
+            let sigma = robust_sigma(&means(part, |run| of(full, run)));
+            let change = root_mean_square(&means(part, |run| {
+                of(fewer, run)
+                    .iter()
+                    .zip(of(full, run))
+                    .map(|(without, with)| without - with)
+                    .collect()
+            }));
+            if sigma > 0.0 { change / sigma } else { 0.0 }
         })
         .fold(0.0, f64::max)
 }

@@ -22,6 +22,7 @@ mod id;
 mod inertial_reaction;
 mod load_crosstalk;
 mod load_sensitivity;
+mod once_a_turn;
 mod relaxation_length;
 mod rolling_resistance;
 mod run_out;
@@ -417,10 +418,10 @@ pub fn catalogue<T: Number>() -> Vec<Box<dyn Mechanism<T>>> {
     for form in zero_drift::FORMS {
         all.push(Box::new(zero_drift::ZeroDrift { form }));
     }
-    for form in run_out::FORMS {
+    for form in once_a_turn::FORMS {
         all.push(Box::new(run_out::RunOut { form }));
     }
-    for form in encoder_ripple::FORMS {
+    for form in once_a_turn::FORMS {
         all.push(Box::new(encoder_ripple::EncoderRipple { form }));
     }
     for form in bearing_drag::FORMS {

@@ -1,0 +1,119 @@
+//! What varies once (or a few times) a revolution of the wheel: shared by run-out and encoder ripple.
+
+use super::{Context, Parameter, Reported};
+use crate::number::Number;
+use crate::prepare::Series;
+
+/// Largest advance of the highest order's phase from one sample to the next, in rad.
+const MOST_ADVANCE: f64 = 2.0;
+
+/// How many orders, and whether the phase is the same in every run.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Form {
+    /// Orders of the wheel's angle, from the first.
+    pub orders: usize,
+    /// A phase of its own for each run.
+    pub phase_per_run: bool,
+}
+
+/// All forms.
+pub const FORMS: [Form; 3] = [
+    Form {
+        orders: 1,
+        phase_per_run: false,
+    },
+    Form {
+        orders: 1,
+        phase_per_run: true,
+    },
+    Form {
+        orders: 3,
+        phase_per_run: true,
+    },
+];
+
+impl Form {
+    /// Word in model files.
+    #[must_use]
+    pub fn as_str(self) -> &'static str {
+        match (self.orders, self.phase_per_run) {
+            (1, false) => "first_order",
+            (_, false) => "three_orders",
+            (1, true) => "first_order_phase_per_run",
+            (_, true) => "three_orders_phase_per_run",
+        }
+    }
+
+    fn phases(self, context: &Context) -> usize {
+        if self.phase_per_run { context.runs } else { 1 }
+    }
+
+    /// Parameters of one phase: a cosine and a sine for each order.
+    fn width(self) -> usize {
+        2 * self.orders
+    }
+
+    /// Cosine and sine amplitudes of every order and phase, within `limit` on either side.
+    #[must_use]
+    pub fn parameters(self, context: &Context, limit: f64) -> Vec<Parameter> {
+        (0..self.phases(context))
+            .flat_map(|run| {
+                (1..=self.orders).flat_map(move |order| {
+                    ["cos", "sin"].map(|part| {
+                        Parameter::new(&format!("{part}{order}_{run}"), "1", -limit, limit)
+                    })
+                })
+            })
+            .collect()
+    }
+
+    /// No ripple; no start where the samples do not resolve the wheel's angle, or one run has a phase of its own.
+    #[must_use]
+    pub fn starts(self, context: &Context) -> Vec<Vec<f64>> {
+        let advance = context.dt * context.mean_wheel_speed * self.orders as f64;
+        if (self.phase_per_run && context.runs < 2) || advance > MOST_ADVANCE {
+            return Vec::new();
+        }
+        vec![vec![0.0; self.width() * self.phases(context)]]
+    }
+
+    /// The relative ripple at every sample of a run; `None` for a run whose phase is not known.
+    pub fn ripple<T: Number>(self, p: &[T], series: &Series) -> Option<Vec<T>> {
+        let from = if self.phase_per_run {
+            self.width() * series.index
+        } else {
+            0
+        };
+        let own = p.get(from..from + self.width())?;
+        Some(
+            series
+                .angle
+                .iter()
+                .map(|angle| {
+                    let mut ripple = T::constant(0.0);
+                    for (order, part) in own.chunks_exact(2).enumerate() {
+                        let (sin, cos) = ((order + 1) as f64 * angle).sin_cos();
+                        ripple += part[0] * cos + part[1] * sin;
+                    }
+                    ripple
+                })
+                .collect(),
+        )
+    }
+
+    /// Amplitude of the first order, root mean square over the phases.
+    pub fn report<T: Number>(self, p: &[T]) -> Vec<Reported<T>> {
+        // Not zero, so that the root has a derivative.
+        let mut power = T::constant(1e-30);
+        let mut phases = 0.0;
+        for own in p.chunks_exact(self.width()) {
+            power += own[0].squared() + own[1].squared();
+            phases += 1.0;
+        }
+        vec![Reported {
+            name: "amplitude",
+            unit: "1",
+            value: (power / phases).sqrt(),
+        }]
+    }
+}
