@@ -13,7 +13,7 @@
 //! | the simulation and its balances | [`model`], [`mechanism`], [`number`] |
 //! | noise from the data | [`noise`], [`saturated`], [`omnibus`] |
 //! | joint fit | [`fit`] |
-//! | choice | [`choose`], [`validation`], [`otherwise`], [`tyre_stage`], [`dynamics_stage`] |
+//! | choice | [`choose`], [`validation`], [`otherwise`], [`place_or_time`], [`tyre_stage`], [`dynamics_stage`] |
 //! | remainder | [`remainder`], [`lines`], [`dynamics_remainder`] |
 //! | proof | [`proof`] |
 //! | location | [`locate`] |
@@ -47,6 +47,7 @@ pub mod number;
 pub mod omnibus;
 pub mod otherwise;
 pub mod outcome;
+pub mod place_or_time;
 pub mod prepare;
 pub mod proof;
 pub mod remainder;

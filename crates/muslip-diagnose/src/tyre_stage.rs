@@ -1,7 +1,7 @@
 //! The tyre balance: base fit, noise, mechanisms, and what they leave.
 
 use crate::campaign::Run;
-use crate::choose::{Candidate, Limits, Search, refine, required, search};
+use crate::choose::{Candidate, Limits, Search, candidate, refine, required, search};
 use crate::data::Data;
 use crate::dynamics_stage::CrossEvidence;
 use crate::fit::{BalanceNoise, Fitted, Joint, Problem, moved};
@@ -10,6 +10,7 @@ use crate::model::{Model, TYRE_BASE, tyre};
 use crate::noise::loss;
 use crate::omnibus::{Action, Levers};
 use crate::otherwise::Otherwise;
+use crate::place_or_time::better_in_time;
 use crate::remainder::{Remainder, applied, candidates, counterparts};
 use crate::saturated::{self, Slow};
 use crate::split::Split;
@@ -201,13 +202,22 @@ fn remainders(
 ) -> TyreStage {
     let problem = &joint.parts[0];
     let count = found.count;
+    let in_time = better_in_time(joint, &found);
+    let clocked = in_time.is_some();
+    if let Some(without) = in_time {
+        found.chosen = candidate(joint, without);
+    }
     let explained = found.base.criterion - found.chosen.criterion;
     let dependences = |model: &Model| {
-        if limits.ablation.remainder {
+        let mut all = if limits.ablation.remainder {
             Vec::new()
         } else {
             candidates(problem, model)
+        };
+        if clocked {
+            all.retain(|r| r.word == "time_s");
         }
+        all
     };
     let left = dependences(&found.chosen.fitted.model);
     let mut unexplained: Vec<Remainder> = Vec::new();

@@ -9,12 +9,14 @@ use crate::prepare::Series;
 pub enum Form {
     /// Accumulated sliding energy.
     Energy,
+    /// Accumulated sliding energy, most of it at first: running in.
+    RunningIn,
     /// The number of the run.
     Run,
 }
 
 /// All forms.
-pub const FORMS: [Form; 2] = [Form::Energy, Form::Run];
+pub const FORMS: [Form; 3] = [Form::Energy, Form::RunningIn, Form::Run];
 
 /// Sliding energy since the campaign began over its total, on the nominal curve: it must not depend on
 /// the parameters that are being fitted.
@@ -42,6 +44,7 @@ impl Describe for WearDrift {
     fn form(&self) -> &'static str {
         match self.form {
             Form::Energy => "energy",
+            Form::RunningIn => "running_in",
             Form::Run => "run",
         }
     }
@@ -49,7 +52,11 @@ impl Describe for WearDrift {
         Stage::Friction
     }
     fn parameters(&self, _context: &Context) -> Vec<Parameter> {
-        vec![Parameter::new("loss", "1", -1.5, 2.5)]
+        let mut all = vec![Parameter::new("loss", "1", -1.5, 2.5)];
+        if self.form == Form::RunningIn {
+            all.push(Parameter::new("log_share", "1", 0.02f64.ln(), 0.6f64.ln()));
+        }
+        all
     }
     fn starts(
         &self,
@@ -57,16 +64,22 @@ impl Describe for WearDrift {
         _series: &[Series],
         _evidence: &[Evidence],
     ) -> Vec<Vec<f64>> {
-        if self.form == Form::Run && context.runs < 2 {
-            Vec::new()
-        } else {
-            vec![vec![0.0]]
+        match self.form {
+            Form::Run if context.runs < 2 => Vec::new(),
+            Form::Run | Form::Energy => vec![vec![0.0]],
+            Form::RunningIn => [0.08f64, 0.25]
+                .iter()
+                .map(|share| vec![0.01, share.ln()])
+                .collect(),
         }
     }
     fn equation(&self) -> &'static str {
         match self.form {
             Form::Energy => {
                 "friction = mu(slip) exp(-loss * sliding energy / total sliding energy)"
+            }
+            Form::RunningIn => {
+                "friction = mu(slip) exp(-loss * (1 - exp(-sliding energy / (share * total sliding energy))))"
             }
             Form::Run => "friction = mu(slip) exp(-loss * run / last run)",
         }
@@ -79,19 +92,30 @@ impl Describe for WearDrift {
     }
 }
 
+impl WearDrift {
+    /// Logarithm of what is left of friction at this share of the campaign's sliding energy.
+    fn left<T: Number>(&self, p: &[T], work: f64) -> T {
+        match self.form {
+            Form::Energy | Form::Run => -(p[0] * work),
+            Form::RunningIn => p[0] * ((-((-p[1]).exp() * work)).exp() + -1.0),
+        }
+    }
+}
+
 impl<T: Number> Mechanism<T> for WearDrift {
     fn apply(&self, p: &[T], series: &Series, context: &Context, state: &mut State<T>) {
         match self.form {
             Form::Run => {
-                let position = series.index as f64 / (context.runs.max(2) - 1) as f64;
-                let factor = (-(p[0] * position)).exp();
+                let last = (context.runs.max(2) - 1) as f64;
+                // Beyond what was recorded nothing is known: as after the last run.
+                let factor = self.left(p, (series.index as f64 / last).min(1.0)).exp();
                 for f in &mut state.friction {
                     *f = *f * factor;
                 }
             }
-            Form::Energy => {
+            Form::Energy | Form::RunningIn => {
                 for (f, work) in state.friction.iter_mut().zip(work(series, context)) {
-                    *f = *f * (-(p[0] * work)).exp();
+                    *f = *f * self.left(p, work).exp();
                 }
             }
         }
@@ -107,17 +131,17 @@ impl<T: Number> Mechanism<T> for WearDrift {
             let all = work(run, context);
             all.iter().sum::<f64>() / all.len().max(1) as f64
         };
-        let span = match (self.form, series.first(), series.last()) {
-            (Form::Run, _, _) => 1.0,
-            (Form::Energy, Some(first), Some(last)) if series.len() > 1 => {
-                mean_work(last) - mean_work(first)
+        let (first, last) = match (self.form, series) {
+            (Form::Energy | Form::RunningIn, [first, .., last]) => {
+                (mean_work(first), mean_work(last))
             }
-            _ => 1.0,
+            _ => (0.0, 1.0),
         };
+        let change = self.left(p, last) - self.left(p, first);
         vec![Reported {
             name: "friction_loss",
             unit: "1",
-            value: -((-(p[0] * span)).exp()) + 1.0,
+            value: -change.exp() + 1.0,
         }]
     }
 }
