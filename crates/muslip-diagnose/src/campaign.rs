@@ -59,9 +59,9 @@ impl Run {
 
     /// The run with means over so many samples each; what is missing or no number is left out of them.
     #[must_use]
-    pub fn averaged(&self, samples: usize) -> Self {
+    pub fn averaged(self, samples: usize) -> Self {
         if samples <= 1 {
-            return self.clone();
+            return self;
         }
         let mean = |x: &Vec<f64>| -> Vec<f64> {
             x.chunks_exact(samples)
@@ -72,7 +72,6 @@ impl Run {
                 .collect()
         };
         Self {
-            name: self.name.clone(),
             time_s: mean(&self.time_s),
             wheel_speed_rad_s: mean(&self.wheel_speed_rad_s),
             vehicle_speed_m_s: mean(&self.vehicle_speed_m_s),
@@ -82,9 +81,10 @@ impl Run {
             brake_pressure_pa: self.brake_pressure_pa.as_ref().map(mean),
             extra: self
                 .extra
-                .iter()
-                .map(|(name, x)| (name.clone(), mean(x)))
+                .into_iter()
+                .map(|(name, x)| (name, mean(&x)))
                 .collect(),
+            name: self.name,
         }
     }
 

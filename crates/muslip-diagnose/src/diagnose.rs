@@ -31,12 +31,12 @@ pub type Progress<'a> = &'a (dyn Fn(f64, &str) + Sync);
 
 /// Samples above which neighbours are averaged first: memory and time would grow without telling more of anything
 /// but the fastest effects.
-const MOST_SAMPLES: usize = 400_000;
+const MOST_SAMPLES: usize = 300_000;
 
 /// Diagnoses a campaign of recordings. Deterministic: the same input gives the same result, whatever
-/// the number of threads.
+/// the number of threads. The recordings are given up, so that long ones need not stay in memory.
 #[must_use]
-pub fn diagnose(rig: &Rig, runs: &[Run], progress: Progress<'_>) -> Diagnosis {
+pub fn diagnose(rig: &Rig, runs: Vec<Run>, progress: Progress<'_>) -> Diagnosis {
     diagnose_without(rig, runs, Ablation::default(), progress)
 }
 
@@ -44,28 +44,23 @@ pub fn diagnose(rig: &Rig, runs: &[Run], progress: Progress<'_>) -> Diagnosis {
 #[must_use]
 pub fn diagnose_without(
     rig: &Rig,
-    runs: &[Run],
+    runs: Vec<Run>,
     ablation: Ablation,
     progress: Progress<'_>,
 ) -> Diagnosis {
     progress(0.0, "cleaning and smoothing the recordings");
     let total: usize = runs.iter().map(Run::len).sum();
     let averaged = total.div_ceil(MOST_SAMPLES).max(1);
-    let means: Vec<Run>;
-    let runs = if averaged > 1 {
-        means = runs.iter().map(|run| run.averaged(averaged)).collect();
-        &means
-    } else {
-        runs
-    };
-    let mut data = Data::new(rig, runs, ablation);
+    // One after the other, so that the long recordings do not outlive their means.
+    let runs: Vec<Run> = runs.into_iter().map(|run| run.averaged(averaged)).collect();
+    let mut data = Data::new(rig, &runs, ablation);
     data.averaged = averaged;
     let split = Split::new(&data);
     let limits = Limits {
         ablation,
         ..Limits::default()
     };
-    let tyre = tyre_stage::analyse(&data, runs, &split, &limits, &progress);
+    let tyre = tyre_stage::analyse(&data, &runs, &split, &limits, &progress);
     progress(0.75, "wheel and vehicle");
     let chain = tyre
         .as_ref()

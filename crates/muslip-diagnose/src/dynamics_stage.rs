@@ -4,7 +4,7 @@ use crate::choose::{Limits, Search, candidate, refine, required, search};
 use crate::data::Data;
 use crate::dynamics_remainder::{DynamicRemainder, candidates};
 use crate::fit::{BalanceNoise, Fitted, Joint, Problem};
-use crate::mechanism::Balance;
+use crate::mechanism::{Balance, Id};
 use crate::model::Model;
 use crate::saturated::{self, Slow};
 use crate::split::Split;
@@ -151,11 +151,51 @@ fn left_over(joint: &Joint<'_>, found: &mut Search, limits: &Limits) -> Vec<Dyna
             return vec![rival];
         }
     }
+    if let Some(without) = viscous_instead(joint, found) {
+        found.chosen = candidate(joint, without);
+    }
     candidates(joint, &found.chosen.fitted.model, limits)
         .into_iter()
         .find(|r| r.worth >= required(limits, found.count, 2.0 * explained))
         .into_iter()
         .collect()
+}
+
+/// Nats by which a drag that grows with the speed itself must fit better than one that grows with its square.
+const VISCOUS_MARGIN: f64 = 3.0;
+
+/// The chosen model without its aero drag where a drag in proportion to the speed fits better: bearings and tyres drag
+/// with the speed, too, but not as air does.
+fn viscous_instead(joint: &Joint<'_>, found: &Search) -> Option<Fitted> {
+    let data = joint.data();
+    let chosen = &found.chosen.fitted;
+    let place = chosen
+        .model
+        .terms
+        .iter()
+        .position(|term| data.catalogue.get(term.entry).id() == Id::AeroDrag)?;
+    let mut viscous = data.clone();
+    for series in &mut viscous.series {
+        for v in &mut series.speed.smooth {
+            *v = (v.abs() * data.context.mean_speed).sqrt();
+        }
+    }
+    let other = Joint {
+        parts: joint
+            .parts
+            .iter()
+            .map(|part| Problem {
+                data: if part.balance == Balance::Vehicle {
+                    &viscous
+                } else {
+                    part.data
+                },
+                ..*part
+            })
+            .collect(),
+    };
+    let in_proportion = other.fit(&chosen.model, 12).loss;
+    (in_proportion + VISCOUS_MARGIN < chosen.loss).then(|| joint.without(found, place))
 }
 
 /// What wheel and vehicle say of a fault in the drag channel: a force that the cell reports late breaks

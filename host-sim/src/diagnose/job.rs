@@ -30,8 +30,7 @@ pub enum WriteError {
     Text(String),
 }
 
-/// Runs the engine on a campaign. The recordings are given up, so that they need not lie in memory any
-/// longer than the engine needs them. What had to be mended to read them joins the faults of the data.
+/// Runs the engine on a campaign. What had to be mended to read them joins the faults of the data.
 #[must_use]
 pub fn run(
     campaign: Campaign,
@@ -39,8 +38,7 @@ pub fn run(
     progress: &(dyn Fn(f64, &str) + Sync),
 ) -> Diagnosis {
     let Campaign { rig, runs, faults } = campaign;
-    let mut diagnosis = diagnose_without(&rig, &runs, ablation, progress);
-    drop(runs);
+    let mut diagnosis = diagnose_without(&rig, runs, ablation, progress);
     add_faults(&mut diagnosis, faults);
     json::make_finite(&mut diagnosis);
     diagnosis
