@@ -211,7 +211,7 @@ impl Repaired {
             .ok_or(RepairedError::NoLikelihood)?;
         let (mut fit, mut holdout, mut fresh) = (Vec::new(), Vec::new(), Vec::new());
         for run in runs {
-            let run = run.averaged(self.averaged.max(1));
+            let run = run.clone().averaged(self.averaged.max(1));
             let known = self.known(&run).map(|at| self.recordings[at].holdout);
             let base = self.predict(&run, Which::Base)?.drag_force_n;
             let repaired = self.predict(&run, Which::Repaired)?.drag_force_n;

@@ -38,6 +38,8 @@ pub struct TyreStage {
 const MECHANISM_SHARE: f64 = 0.85;
 /// The same of a dependence on a recorded column: that it fits at all is no chance.
 const RECORDED_SHARE: f64 = 1.0;
+/// The same where it stands against several mechanisms at once: one cause is likelier than two or three.
+const RECORDED_SHARE_OF_SEVERAL: f64 = 1.15;
 /// The same where one mechanism says much the same as the free dependence.
 const COUNTERPART_SHARE: f64 = 0.7;
 /// Fraction of the strongest dependence that one on a recorded column must reach to be preferred to it.
@@ -215,7 +217,7 @@ fn remainders(
             candidates(problem, model)
         };
         if clocked {
-            all.retain(|r| r.word == "time_s");
+            all.retain(|r| r.word == "time_s" || r.recorded());
         }
         all
     };
@@ -240,7 +242,8 @@ fn remainders(
                 .any(|id| found.chosen.ids.contains(id));
             // A mechanism that says much the same has the better of it, unless it takes several.
             let share = match (top.recorded(), counterpart, found.chosen.ids.len()) {
-                (true, ..) => RECORDED_SHARE,
+                (true, _, 1) => RECORDED_SHARE,
+                (true, ..) => RECORDED_SHARE_OF_SEVERAL,
                 (false, true, 1) => COUNTERPART_SHARE,
                 _ => MECHANISM_SHARE,
             };
