@@ -3,14 +3,17 @@
 mod common;
 
 use std::net::TcpListener;
+use std::process::{Command, Stdio};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
 
 use common::{RIG, Scratch};
 use muslip_record::Parameters;
 use pil::native::Native;
 use pil::rig::{Rig, Trouble};
+use pil::serve::Pace;
 
 /// A rig at 20 m/s, twice as fast as a real one.
 struct Server {
@@ -35,7 +38,11 @@ impl Server {
                 if stopped.load(Ordering::Relaxed) {
                     return;
                 }
-                pil::serve::serve(&mut target, &mut rig, client, 2.0, &stopped).unwrap();
+                let pace = Pace {
+                    speed: 2.0,
+                    waits: true,
+                };
+                pil::serve::serve(&mut target, &mut rig, client, pace, &stopped).unwrap();
             }
         });
         Self {
@@ -86,6 +93,86 @@ fn a_ramp_is_recorded_and_the_recording_goes_straight_into_the_estimate() {
         "run.csv",
     ]);
     assert!(estimate.contains("0.8"), "{estimate}");
+}
+
+#[test]
+fn killed_while_it_records_it_keeps_every_row_and_the_estimate_takes_the_file() {
+    let server = Server::start(Trouble::default());
+    let scratch = Scratch::with_rig(RIG);
+    let mut child = Command::new(env!("CARGO_BIN_EXE_muslip-under-test"))
+        .current_dir(scratch.path(""))
+        .args(["rig", "--port", &server.address, "run"])
+        .args(["--ramp", "0.2", "--out", "run.csv"])
+        .stdout(Stdio::null())
+        .stderr(Stdio::null())
+        .spawn()
+        .unwrap();
+    let start = Instant::now();
+    let rows = || {
+        let text = std::fs::read_to_string(scratch.path("run.csv")).unwrap_or_default();
+        text.lines()
+            .filter(|line| line.starts_with(|c: char| c.is_ascii_digit()))
+            .count()
+    };
+    while rows() < 1_000 {
+        assert!(start.elapsed() < Duration::from_secs(60), "{} rows", rows());
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    let seen = rows();
+    // SIGKILL: nothing of its own runs any more.
+    child.kill().unwrap();
+    child.wait().unwrap();
+    let text = scratch.read("run.csv");
+    assert!(text.ends_with('\n') && rows() >= seen);
+    let data: Vec<&str> = text
+        .lines()
+        .skip_while(|line| !line.starts_with("time_s"))
+        .skip(1)
+        .collect();
+    for (index, line) in data.iter().enumerate() {
+        let cells: Vec<f64> = line.split(',').map(|cell| cell.parse().unwrap()).collect();
+        assert_eq!(cells.len(), 6, "{line}");
+        // In milliseconds, one after the other.
+        assert_eq!((cells[0] * 1e3).round(), index as f64, "{line}");
+    }
+    let told = scratch.output(&["estimate", "--rig", "rig.toml", "run.csv"]);
+    assert!(told.contains("peak friction"), "{told}");
+    // A power cut may tear the last row: it is named by its line.
+    scratch.write("torn.csv", &text[..text.len() - 20]);
+    let told = scratch.complaint(&["estimate", "--rig", "rig.toml", "torn.csv"]);
+    assert!(
+        told.contains(&format!("torn.csv:{}:", text.lines().count())),
+        "{told}"
+    );
+}
+
+#[test]
+fn recordings_go_straight_into_the_diagnosis() {
+    let server = Server::start(Trouble::default());
+    let scratch = Scratch::with_rig(RIG);
+    for name in ["a.csv", "b.csv"] {
+        let said = scratch.output(&[
+            "rig",
+            "--port",
+            &server.address,
+            "run",
+            "--ramp",
+            "0.8",
+            "--applications",
+            "2",
+            "--cool",
+            "0.2",
+            "--out",
+            name,
+        ]);
+        assert!(said.contains(" 0 samples missing"), "{said}");
+    }
+    scratch.output(&[
+        "diagnose", "--rig", "rig.toml", "--out", "found", "a.csv", "b.csv",
+    ]);
+    let diagnosis: serde_json::Value =
+        serde_json::from_str(&scratch.read("found/diagnosis.json")).unwrap();
+    assert!(diagnosis["verdict"].is_string(), "{diagnosis:#}");
 }
 
 #[test]

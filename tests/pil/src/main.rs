@@ -13,6 +13,7 @@ use pil::bench::Worst;
 use pil::qemu::Qemu;
 use pil::rig::Rig;
 use pil::scenarios::{self, CYCLES_PER_SAMPLE, Found, WORK_PERCENT, most};
+use pil::serve::Pace;
 
 /// Processor in the loop: the firmware's image in QEMU, in lock-step with the rig simulator.
 #[derive(Parser)]
@@ -34,6 +35,12 @@ struct Arguments {
     #[arg(long)]
     figures: Option<PathBuf>,
 }
+
+/// A silent client is a fault there as on a rig.
+const REAL_TIME: Pace = Pace {
+    speed: 1.0,
+    waits: false,
+};
 
 type Scenario<'a> = (&'a str, Box<dyn Fn() -> Result<Found> + 'a>);
 
@@ -125,6 +132,12 @@ fn serve(address: &str, image: &Path) -> Result<()> {
     println!("a simulated rig, rolling at 20 m/s: muslip rig --port tcp:{address} status");
     loop {
         let (client, _) = listener.accept()?;
-        pil::serve::serve(&mut qemu, &mut rig, client, 1.0, &AtomicBool::new(false))?;
+        pil::serve::serve(
+            &mut qemu,
+            &mut rig,
+            client,
+            REAL_TIME,
+            &AtomicBool::new(false),
+        )?;
     }
 }

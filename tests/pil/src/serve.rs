@@ -7,6 +7,7 @@ use std::time::{Duration, Instant};
 
 use anyhow::Result;
 use muslip_control::brake::BrakeOutput;
+use muslip_control::interlock::SILENT_SAMPLES;
 
 use crate::bench::WIRE_BYTES;
 use crate::rig::Rig;
@@ -28,7 +29,20 @@ pub fn settle(target: &mut impl Target, rig: &mut Rig) -> Result<()> {
     Ok(())
 }
 
-/// Samples for a client until it leaves or `stop` is set; `speed` is simulated over real time.
+/// How simulated time goes on.
+#[derive(Debug, Clone, Copy)]
+pub struct Pace {
+    /// Simulated over real time.
+    pub speed: f64,
+    /// Whether time stands still before a client's silence becomes a fault. For tests: a busy machine may not let
+    /// their client run for a quarter of a second.
+    pub waits: bool,
+}
+
+/// Silence that a server which waits lets pass, in samples.
+const PATIENCE_SAMPLES: u32 = SILENT_SAMPLES - 50;
+
+/// Samples for a client until it leaves or `stop` is set.
 ///
 /// # Errors
 /// The target is gone.
@@ -36,7 +50,7 @@ pub fn serve(
     target: &mut impl Target,
     rig: &mut Rig,
     mut client: TcpStream,
-    speed: f64,
+    pace: Pace,
     stop: &AtomicBool,
 ) -> Result<()> {
     client.set_nodelay(true)?;
@@ -44,21 +58,29 @@ pub fn serve(
     let start = Instant::now();
     let mut brake = BrakeOutput::DUMPED;
     let mut samples = 0_u64;
+    let mut silent_samples = 0;
     let mut unsent = Vec::new();
     while !stop.load(Ordering::Relaxed) {
-        let due = Duration::from_secs_f64(samples as f64 * 1e-3 / speed);
+        let due = Duration::from_secs_f64(samples as f64 * 1e-3 / pace.speed);
         if let Some(wait) = due.checked_sub(start.elapsed()) {
             std::thread::sleep(wait);
         }
-        samples += 1;
         // What the wire brings in a sample.
         let mut arrived = [0; WIRE_BYTES as usize];
         let count = match client.read(&mut arrived) {
             Ok(0) => return Ok(()),
             Ok(count) => count,
-            Err(error) if error.kind() == ErrorKind::WouldBlock => 0,
+            Err(error) if error.kind() == ErrorKind::WouldBlock => {
+                if pace.waits && silent_samples >= PATIENCE_SAMPLES {
+                    std::thread::sleep(Duration::from_millis(1));
+                    continue;
+                }
+                0
+            }
             Err(_) => return Ok(()),
         };
+        samples += 1;
+        silent_samples = if count > 0 { 0 } else { silent_samples + 1 };
         let output = target.sample(&Input {
             raw: rig.sample(brake),
             link: arrived.get(..count).unwrap_or_default(),
