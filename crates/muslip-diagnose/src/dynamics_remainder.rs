@@ -10,8 +10,10 @@ use crate::lines;
 use crate::mechanism::Balance;
 use crate::model::Model;
 use crate::noise::robust_sigma;
-use crate::omnibus::{Column, Found, Regression, Variable, hats, knots};
+use crate::omnibus::{Column, hats, knots};
+use crate::regression::{Found, Regression};
 use crate::size::{LEAST_EFFECT, means, root_mean_square};
+use crate::variable::Variable;
 
 /// A dependence of one balance on one variable.
 #[derive(Clone, Debug)]

@@ -11,7 +11,7 @@
 //! | what is given | [`campaign`], [`prepare`], [`smooth`], [`data`] |
 //! | what is kept for the proof | [`split`] |
 //! | the simulation and its balances | [`model`], [`mechanism`], [`number`] |
-//! | noise from the data | [`noise`], [`saturated`], [`omnibus`] |
+//! | noise from the data | [`noise`], [`saturated`], [`omnibus`], [`variable`], [`regression`] |
 //! | joint fit | [`fit`] |
 //! | choice | [`choose`], [`validation`], [`otherwise`], [`place_or_time`], [`tyre_stage`], [`dynamics_stage`] |
 //! | remainder | [`remainder`], [`lines`], [`dynamics_remainder`] |
@@ -50,6 +50,7 @@ pub mod outcome;
 pub mod place_or_time;
 pub mod prepare;
 pub mod proof;
+pub mod regression;
 pub mod remainder;
 pub mod repaired;
 pub mod saturated;
@@ -59,3 +60,4 @@ pub mod smooth;
 pub mod split;
 pub mod tyre_stage;
 pub mod validation;
+pub mod variable;

@@ -3,8 +3,8 @@
 use core::ops::Range;
 
 use crate::data::Data;
-use crate::omnibus::Variable;
 use crate::outcome::Region;
+use crate::variable::Variable;
 
 /// Length over which the difference is averaged in s.
 const MEAN_S: f64 = 0.05;

@@ -8,8 +8,10 @@ use crate::fit::Problem;
 use crate::lines::{self, Line, PLACES, phase_of, strongest};
 use crate::mechanism::Id;
 use crate::model::Model;
-use crate::omnibus::{Action, Column, Found, Group, Levers, Regression, Variable, group};
+use crate::omnibus::{Action, Column, Group, Levers, group};
+use crate::regression::{Found, Regression};
 use crate::repaired::Correction;
+use crate::variable::Variable;
 
 /// An empirical dependence on one variable.
 #[derive(Clone, Debug)]

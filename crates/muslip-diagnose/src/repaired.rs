@@ -9,9 +9,10 @@ use crate::campaign::{Rig, Run};
 use crate::data::{Catalogue, Data};
 use crate::mechanism::{Context, Parameter};
 use crate::model::{Model, Term, tyre};
-use crate::omnibus::{Action, Levers, Variable, hat};
+use crate::omnibus::{Action, Levers, hat};
 use crate::prepare::{Series, prepare};
 use crate::proof::Likelihood;
+use crate::variable::Variable;
 
 /// A mechanism with its parameters.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

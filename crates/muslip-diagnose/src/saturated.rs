@@ -10,7 +10,9 @@ use crate::lines::{self, PLACES, phase_of, strongest};
 use crate::mechanism::Balance;
 use crate::model::Model;
 use crate::noise::{NoiseSize, Whitener, robust_sigma};
-use crate::omnibus::{Action, Column, Levers, Regression, Variable, group};
+use crate::omnibus::{Action, Column, Levers, group};
+use crate::regression::Regression;
+use crate::variable::Variable;
 
 /// Times in s by which the predicted force is held back to stand for anything the chain may do.
 const TAPS_S: [f64; 8] = [0.002, 0.005, 0.010, 0.016, 0.024, 0.036, 0.055, 0.085];
