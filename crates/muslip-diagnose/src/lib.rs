@@ -8,7 +8,7 @@
 //!
 //! | step | module |
 //! | --- | --- |
-//! | what is given | [`campaign`], [`prepare`], [`smooth`], [`data`] |
+//! | what is given | [`campaign`], `cleaning`, [`prepare`], [`smooth`], [`data`] |
 //! | what is kept for the proof | [`split`] |
 //! | the simulation and its balances | [`model`], [`mechanism`], [`number`] |
 //! | noise from the data | [`noise`], [`saturated`], [`omnibus`], [`variable`], [`regression`] |
@@ -31,6 +31,7 @@
 pub mod ablation;
 pub mod campaign;
 pub mod choose;
+mod cleaning;
 pub mod confidence;
 pub mod data;
 pub mod diagnose;

@@ -15,8 +15,8 @@ use crate::effect::{Effect, Scale};
 use crate::files::recording;
 use crate::form::{Form, mechanism};
 use crate::rig::Rig;
+use crate::share::quantile;
 use crate::table::Table;
-use crate::tally::quantile;
 use crate::tyre::{Contact, curve_scaling};
 
 /// Mechanisms that the estimator can compensate.

@@ -5,6 +5,7 @@
 //! crate depends on no other member of the workspace: it knows the tool by its files alone.
 #![forbid(unsafe_code)]
 
+mod bars;
 mod baseline;
 mod campaign;
 mod cause;
@@ -28,7 +29,9 @@ mod pages;
 mod plan;
 mod process;
 mod rig;
+mod rivals;
 mod score;
+mod share;
 mod sim;
 mod strata;
 mod table;

@@ -10,7 +10,7 @@ use crate::cause::{shortfalls, symptom};
 use crate::judge::Case;
 use crate::score::Report;
 use crate::table::Table;
-use crate::tally;
+use crate::{bars, rivals, tally};
 
 /// What the pages tell beside the judged campaigns.
 pub struct Telling<'a> {
@@ -49,10 +49,10 @@ pub fn write(directory: &Path, telling: &Telling<'_>) -> Result<()> {
 fn front(telling: &Telling<'_>) -> String {
     let cases = &telling.report.cases;
     let mut text = telling.introduction.clone();
-    let mut tables = vec![tally::bars(cases), telling.pace.clone(), shortfalls(cases)];
+    let mut tables = vec![bars::bars(cases), telling.pace.clone(), shortfalls(cases)];
     tables.extend(telling.measured.iter().cloned());
     if !telling.report.baselines.is_empty() {
-        tables.push(tally::baselines(cases, &telling.report.baselines));
+        tables.push(rivals::baselines(cases, &telling.report.baselines));
     }
     tables.push(telling.ablations.clone());
     tables.extend([

@@ -11,8 +11,8 @@ use crate::baseline::{Verdicts, verdicts};
 use crate::campaign::Truth;
 use crate::files::{names, seal, truth};
 use crate::judge::{Case, judge};
-use crate::tally;
 use crate::tool::{Answer, Tool};
+use crate::{bars, rivals, tally};
 
 /// What to score, and how much to say.
 #[derive(Clone, Debug)]
@@ -170,9 +170,9 @@ impl Report {
             text.push('\n');
         }
         if !self.baselines.is_empty() {
-            text.push_str(&tally::baselines(cases, &self.baselines).text());
+            text.push_str(&rivals::baselines(cases, &self.baselines).text());
         }
-        text.push_str(&tally::bars(cases).text());
+        text.push_str(&bars::bars(cases).text());
         text
     }
 

@@ -11,10 +11,10 @@ use crate::judge::Case;
 use crate::measured;
 use crate::pace::{self, Pace};
 use crate::pages::{self, Telling};
+use crate::rivals;
 use crate::score::{Report, ScoreRequest, score};
 use crate::strata::Request;
 use crate::table::Table;
-use crate::tally;
 use crate::tool::Tool;
 
 /// What a trial is made with.
@@ -303,7 +303,7 @@ fn ablations(
             },
         ));
     }
-    let mut table = tally::ablations(&rows);
+    let mut table = rivals::ablations(&rows);
     table.note = Some(format!(
         "Every {}th campaign by number, the same for all rows.",
         trial.ablate_every
