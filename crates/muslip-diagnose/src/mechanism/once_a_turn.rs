@@ -101,8 +101,8 @@ impl Form {
         )
     }
 
-    /// Amplitude of the first order, root mean square over the phases.
-    pub fn report<T: Number>(self, p: &[T]) -> Vec<Reported<T>> {
+    /// Amplitude of the first order, root mean square over the phases, times a factor.
+    pub fn report<T: Number>(self, p: &[T], factor: f64) -> Vec<Reported<T>> {
         // Not zero, so that the root has a derivative.
         let mut power = T::constant(1e-30);
         let mut phases = 0.0;
@@ -113,7 +113,7 @@ impl Form {
         vec![Reported {
             name: "amplitude",
             unit: "1",
-            value: (power / phases).sqrt(),
+            value: (power / phases).sqrt() * factor,
         }]
     }
 }

@@ -64,6 +64,6 @@ impl<T: Number> Mechanism<T> for RunOut {
         _context: &Context,
         _series: &[Series],
     ) -> Vec<Reported<T>> {
-        self.form.report(p)
+        self.form.report(p, 1.0)
     }
 }
