@@ -77,6 +77,13 @@ pub struct Search {
     pub count: usize,
 }
 
+impl Search {
+    /// Takes out all that was tried with a mechanism whose name was withdrawn: it is no alternative to what is left.
+    pub fn forget(&mut self, id: Id) {
+        self.tried.retain(|candidate| !candidate.ids.contains(&id));
+    }
+}
+
 impl Joint<'_> {
     /// The chosen model without one of its mechanisms, the others fitted anew.
     #[must_use]
@@ -338,14 +345,13 @@ fn extend(
                 // What is led further beside the best is there in case of a wrong turn, not to be searched again.
                 &own[..1]
             };
-            let (model, predicted, order) = extended(
+            extended(
                 joint,
                 &linear[place],
                 &beam[place].fitted.model,
                 entry,
                 from,
-            )?;
-            Some((model, predicted, order))
+            )
         })
         .collect();
     let mut promising: Vec<(Model, f64)> = Vec::new();

@@ -40,6 +40,20 @@ fn part<'a>(
     }
 }
 
+fn joint_under<'a>(
+    data: &'a Data,
+    split: &'a Split,
+    noise: &'a [(Balance, BalanceNoise)],
+    chain: Option<&'a [Vec<f64>]>,
+) -> Joint<'a> {
+    Joint {
+        parts: noise
+            .iter()
+            .map(|(balance, noise)| part(data, split, *balance, noise, chain))
+            .collect(),
+    }
+}
+
 /// Balances that the recordings allow.
 fn available(data: &Data, split: &Split) -> Vec<Balance> {
     [Balance::Wheel, Balance::Vehicle]
@@ -91,12 +105,7 @@ pub fn analyse(
     if noise.is_empty() {
         return None;
     }
-    let joint = Joint {
-        parts: noise
-            .iter()
-            .map(|(b, n)| part(data, split, *b, n, chain))
-            .collect(),
-    };
+    let joint = joint_under(data, split, &noise, chain);
     let base = joint.fit(&model, 1);
     let mut found = search(&joint, base, limits);
     let sharper_noise = noises(
@@ -106,12 +115,7 @@ pub fn analyse(
         chain,
         Slow::Counted,
     );
-    let sharper = Joint {
-        parts: sharper_noise
-            .iter()
-            .map(|(b, n)| part(data, split, *b, n, chain))
-            .collect(),
-    };
+    let sharper = joint_under(data, split, &sharper_noise, chain);
     if found.chosen.ids.is_empty() {
         found = under(&sharper, found);
     } else {
@@ -153,7 +157,9 @@ fn left_over(joint: &Joint<'_>, found: &mut Search, limits: &Limits) -> Vec<Dyna
     }
     if let Some(without) = viscous_instead(joint, found) {
         found.chosen = candidate(joint, without);
+        found.forget(Id::AeroDrag);
     }
+    let explained = found.base.criterion - found.chosen.criterion;
     candidates(joint, &found.chosen.fitted.model, limits)
         .into_iter()
         .find(|r| r.worth >= required(limits, found.count, 2.0 * explained))
@@ -209,7 +215,8 @@ pub struct CrossEvidence<'a> {
 
 /// Weight of the cross evidence: these balances have noise models of their own to be wrong.
 const CROSS_WEIGHT: f64 = 0.5;
-/// Price in nats of each further mechanism that a set of tyre mechanisms calls for in wheel and vehicle.
+/// Price in nats of each further mechanism that a set of tyre mechanisms calls for in wheel and vehicle: one fault in the
+/// channel is likelier than two or three elsewhere that happen to look like it.
 const EXTRA_MECHANISM: f64 = 40.0;
 /// Sets of tyre mechanisms that are compared by it.
 const COMPARED: usize = 4;
@@ -235,14 +242,7 @@ impl<'a> CrossEvidence<'a> {
     /// Least loss and price of both balances with this chain taken off the drag, whatever mechanisms of their
     /// own they then need.
     fn criterion(&self, chain: Option<&[Vec<f64>]>) -> f64 {
-        // One fault in the channel against two or three elsewhere that happen to look like it.
-        let joint = Joint {
-            parts: self
-                .noise
-                .iter()
-                .map(|(b, n)| part(self.data, self.split, *b, n, chain))
-                .collect(),
-        };
+        let joint = joint_under(self.data, self.split, &self.noise, chain);
         let base = joint.fit(&Model::default(), 1);
         let chosen = search(&joint, base, &self.limits).chosen;
         CROSS_WEIGHT * chosen.criterion + EXTRA_MECHANISM * chosen.ids.len() as f64

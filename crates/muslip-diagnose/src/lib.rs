@@ -16,7 +16,7 @@
 //! | choice | [`choose`], [`validation`], [`otherwise`], [`place_or_time`], [`tyre_stage`], [`dynamics_stage`] |
 //! | remainder | [`remainder`], [`lines`], [`dynamics_remainder`] |
 //! | proof | [`proof`] |
-//! | location | [`locate`] |
+//! | location | [`locate`], `size` |
 //! | how sure, and what was looked for | [`confidence`], [`separating`], [`looked`] |
 //! | what each part is worth | [`ablation`] |
 //! | result and repaired model | [`diagnose`](mod@diagnose), [`outcome`], [`repaired`] |

@@ -62,7 +62,7 @@ pub fn intervals(
         .into_iter()
         .map(|(from, to)| {
             let square: f64 = (from..=to)
-                .filter(|k| ok[*k])
+                .filter(|k| ok[*k] && difference[*k].is_finite())
                 .map(|k| difference[k] * difference[k])
                 .sum();
             (

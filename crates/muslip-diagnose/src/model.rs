@@ -201,7 +201,7 @@ pub fn wheel<T: Listed>(
     chain: Option<&[f64]>,
 ) -> Vec<T> {
     let n = series.len();
-    let Some(torque) = &series.torque else {
+    let (Some(torque), false) = (&series.torque, series.drag.is_empty()) else {
         return vec![T::constant(0.0); n];
     };
     let mut state = State::empty();
@@ -247,6 +247,9 @@ pub fn vehicle<T: Listed>(
     chain: Option<&[f64]>,
 ) -> Vec<T> {
     let n = series.len();
+    if series.drag.is_empty() {
+        return vec![T::constant(0.0); n];
+    }
     let mut state = State::empty();
     state.opposing = vec![T::constant(0.0); n];
     for (entry, own) in split(model, p) {

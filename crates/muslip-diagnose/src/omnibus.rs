@@ -102,7 +102,7 @@ pub fn hats(
         .collect()
 }
 
-/// A sample without a usable input takes no part in a column.
+/// A number that every column and every reader of a file can take.
 #[must_use]
 pub fn finite_or_zero(x: f64) -> f64 {
     if x.is_finite() { x } else { 0.0 }

@@ -10,9 +10,10 @@ use crate::data::Data;
 use crate::fit::Problem;
 use crate::mechanism::Context;
 use crate::noise::{NoiseSize, Whitener, loss, whiteness};
+use crate::omnibus::finite_or_zero;
 use crate::outcome::{BeforeAfter, Score};
 use crate::prepare::{Series, prepare};
-use crate::repaired::{NoiseModel, Repaired, RepairedError, Which};
+use crate::repaired::{Repaired, RepairedError, Which};
 use crate::split;
 use crate::tyre_stage::TyreStage;
 
@@ -107,19 +108,15 @@ pub(crate) fn score(
     let n = innovations.len().max(1) as f64;
     let mean_loss = innovations.iter().map(|e| loss(*e)).sum::<f64>() / n;
     Score {
-        rmse_n: finite((square / count).sqrt()),
-        nll_per_sample: finite(
+        rmse_n: finite_or_zero((square / count).sqrt()),
+        nll_per_sample: finite_or_zero(
             mean_loss
                 + 0.5 * core::f64::consts::TAU.ln()
                 + sigma.max(1e-300).ln()
                 + log_scale / count,
         ),
-        whiteness_p: whiteness(innovations).map(finite),
+        whiteness_p: whiteness(innovations).map(finite_or_zero),
     }
-}
-
-fn finite(x: f64) -> f64 {
-    if x.is_finite() { x } else { 0.0 }
 }
 
 /// Figures of the tyre balance within a diagnosis: the noise's size follows the repaired model's reading, as it does
@@ -184,14 +181,9 @@ impl Repaired {
     #[must_use]
     pub fn reading_sigma(&self, run: &Run, expected_n: &[f64]) -> Vec<f64> {
         let Some(likelihood) = &self.noise.likelihood else {
-            let NoiseModel {
-                sigma_n,
-                share_of_force,
-                ..
-            } = &self.noise;
             return expected_n
                 .iter()
-                .map(|f| sigma_n.hypot(share_of_force * f))
+                .map(|f| self.noise.of_reading(*f))
                 .collect();
         };
         let (series, _) = prepare(&self.rig, run, &[], 0, self.context.reach_factor);

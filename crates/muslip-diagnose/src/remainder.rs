@@ -22,7 +22,7 @@ pub struct Remainder {
     pub variable: Option<Variable>,
     /// Gain in nats on the data fitted.
     pub gain: f64,
-    /// Gain in nats on runs left out in turn; the in-sample gain where there is one run only.
+    /// Gain in nats on runs left out in turn; the in-sample gain where there are fewer than three.
     pub held_out: f64,
     /// Independent columns.
     pub rank: usize,
@@ -142,6 +142,9 @@ fn periodic(problem: &Problem<'_>, regression: &Regression, levers: &Levers) -> 
         let columns = lines::columns(problem, rate, &lever, &phase);
         let references: Vec<&Column> = columns.iter().collect();
         let fit = regression.on(problem, &references);
+        if fit.rank == 0 || !fit.gain.is_finite() {
+            continue;
+        }
         let amplitude = {
             let sum: f64 = fit.coefficients.iter().map(|c| c * c).sum();
             (sum / problem.runs.len() as f64).sqrt()
@@ -149,13 +152,19 @@ fn periodic(problem: &Problem<'_>, regression: &Regression, levers: &Levers) -> 
         let common = (word == "distance_m")
             .then(|| same_everywhere(problem, regression, rate, &lever, &phase, &fit))
             .flatten();
-        let form = match word {
-            "time_s" => format!(
+        let form = match (word, &common) {
+            (_, Some(([rate, cosine, sine], _))) => format!(
+                "{:.4} * sin(2 pi x / {:.2} m + {:.2})",
+                cosine.hypot(*sine),
+                core::f64::consts::TAU / rate,
+                cosine.atan2(*sine)
+            ),
+            ("time_s", _) => format!(
                 "{:.4} * sin(2 pi {:.3} Hz t + phase of the run)",
                 amplitude,
                 rate / core::f64::consts::TAU
             ),
-            "distance_m" => format!(
+            ("distance_m", _) => format!(
                 "{:.4} * sin(2 pi x / {:.2} m + phase of the run)",
                 amplitude,
                 core::f64::consts::TAU / rate
@@ -167,7 +176,7 @@ fn periodic(problem: &Problem<'_>, regression: &Regression, levers: &Levers) -> 
             variable: None,
             gain: fit.gain,
             // The frequency was looked for among many: a price of a few nats a run.
-            held_out: fit.gain - (count_lines(problem) as f64).ln() - problem.runs.len() as f64,
+            held_out: fit.gain - (problem.count().max(2) as f64).ln() - problem.runs.len() as f64,
             rank: fit.rank,
             correction: Correction {
                 variable: word.to_owned(),
@@ -223,10 +232,6 @@ fn same_everywhere(
                 found.own,
             )
         })
-}
-
-fn count_lines(problem: &Problem<'_>) -> usize {
-    problem.count().max(2)
 }
 
 /// Mechanisms that say the same as a dependence on this variable.

@@ -78,6 +78,14 @@ pub struct NoiseModel {
     pub likelihood: Option<Likelihood>,
 }
 
+impl NoiseModel {
+    /// Standard deviation of a reading of this force in N.
+    #[must_use]
+    pub fn of_reading(&self, force: f64) -> f64 {
+        self.sigma_n.hypot(self.share_of_force * force)
+    }
+}
+
 /// The range of operation that the model was fitted on.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Domain {
@@ -296,9 +304,12 @@ impl Repaired {
     pub(crate) fn known(&self, run: &Run) -> Option<usize> {
         let averaged = self.averaged.max(1);
         self.recordings.iter().position(|r| {
-            (r.samples == run.len() || r.samples == run.len() * averaged)
-                && run.time_s.first().is_some_and(|t| *t == r.first_time_s)
-                && file_name(&r.path) == file_name(&run.name)
+            // A long recording was averaged before: as given it has an incomplete last mean, and an earlier first time.
+            let as_averaged = r.samples == run.len() * averaged
+                && run.time_s.first().is_some_and(|t| *t == r.first_time_s);
+            let as_given = r.samples == run.len() / averaged * averaged
+                && mean_of(&run.time_s, averaged).is_some_and(|t| t == r.first_time_s);
+            (as_averaged || as_given) && file_name(&r.path) == file_name(&run.name)
         })
     }
 
@@ -362,10 +373,7 @@ impl Repaired {
                 *f = last;
             }
         }
-        let drag_force_sigma_n = force
-            .iter()
-            .map(|f| self.noise.sigma_n.hypot(self.noise.share_of_force * f))
-            .collect();
+        let drag_force_sigma_n = force.iter().map(|f| self.noise.of_reading(*f)).collect();
         Ok(Prediction {
             time_s: run.time_s.clone(),
             drag_force_n: force,
@@ -376,6 +384,11 @@ impl Repaired {
                 .collect(),
         })
     }
+}
+
+/// First mean over so many samples.
+fn mean_of(time: &[f64], samples: usize) -> Option<f64> {
+    Some(time.get(..samples)?.iter().sum::<f64>() / samples as f64)
 }
 
 fn file_name(path: &str) -> &str {

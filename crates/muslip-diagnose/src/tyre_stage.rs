@@ -1,11 +1,11 @@
 //! The tyre balance: base fit, noise, mechanisms, and what they leave.
 
 use crate::campaign::Run;
-use crate::choose::{Candidate, Limits, Search, candidate, refine, required, search};
+use crate::choose::{Limits, Search, candidate, refine, required, search};
 use crate::data::Data;
 use crate::dynamics_stage::CrossEvidence;
 use crate::fit::{BalanceNoise, Fitted, Joint, Problem, moved};
-use crate::mechanism::{Balance, Stage};
+use crate::mechanism::{Balance, Id, Stage};
 use crate::model::{Model, TYRE_BASE, tyre};
 use crate::noise::loss;
 use crate::omnibus::{Action, Levers};
@@ -208,6 +208,7 @@ fn remainders(
     let clocked = in_time.is_some();
     if let Some(without) = in_time {
         found.chosen = candidate(joint, without);
+        found.forget(Id::SurfacePatch);
     }
     let explained = found.base.criterion - found.chosen.criterion;
     let dependences = |model: &Model| {
@@ -255,8 +256,7 @@ fn remainders(
             let together = explained + best_left.map_or(0.0, |l| l.worth(count).max(0.0));
             let needed = required(limits, count, 3.0 * rival.worth(count));
             if together - rival.worth(count) < needed {
-                let base = found.base.clone();
-                found.chosen = Candidate { ..base };
+                found.chosen = found.base.clone();
                 unexplained.push(rival.clone());
                 corrections.push(rival.clone());
             }
@@ -348,6 +348,10 @@ fn corrected(
     fitted: &Fitted,
     remainder: &Remainder,
 ) -> Option<(Model, Remainder)> {
+    if !remainder.correction.carries() {
+        // A phase of each run's own carries nothing over to other runs.
+        return Some((fitted.model.clone(), remainder.clone()));
+    }
     let problem = &joint.parts[0];
     let remainder = &about_its_mean(problem, &fitted.model, remainder);
     let bounds = joint.bounds(&fitted.model);
@@ -379,10 +383,7 @@ fn corrected(
             (before - after, model, amended)
         })
         .max_by(|a, b| a.0.total_cmp(&b.0))
-        .filter(|(gain, ..)| {
-            // A phase of each run's own carries nothing over to other runs.
-            !remainder.correction.carries() || *gain >= KEPT_PROMISE * remainder.gain
-        })
+        .filter(|(gain, ..)| *gain >= KEPT_PROMISE * remainder.gain)
         .map(|(_, model, amended)| (model, amended))
 }
 

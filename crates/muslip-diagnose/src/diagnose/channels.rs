@@ -2,10 +2,11 @@
 
 use std::collections::BTreeMap;
 
-use super::{Outcome, finite};
+use super::Outcome;
 use crate::confidence::covariance;
 use crate::mechanism::Balance;
 use crate::noise::robust_sigma;
+use crate::omnibus::finite_or_zero;
 use crate::outcome::{ChannelNoise, Estimate, Fault};
 use crate::tyre_stage::TyreStage;
 
@@ -31,7 +32,7 @@ impl Outcome<'_> {
             noise.insert(
                 name.to_owned(),
                 ChannelNoise {
-                    sigma: finite(sigma),
+                    sigma: finite_or_zero(sigma),
                     declared: declared(name),
                 },
             );
@@ -116,8 +117,8 @@ impl Outcome<'_> {
             }
         }
         for estimate in base.values_mut() {
-            estimate.value = finite(estimate.value);
-            estimate.std = finite(estimate.std);
+            estimate.value = finite_or_zero(estimate.value);
+            estimate.std = finite_or_zero(estimate.std);
         }
         base
     }
@@ -129,8 +130,8 @@ impl Outcome<'_> {
             .map(|f| Fault {
                 recording: f.recording.clone(),
                 channel: f.channel.clone(),
-                start_s: finite(f.start_s),
-                end_s: finite(f.end_s),
+                start_s: finite_or_zero(f.start_s),
+                end_s: finite_or_zero(f.end_s),
                 what: f.what.clone(),
             })
             .collect();
@@ -139,8 +140,8 @@ impl Outcome<'_> {
                 faults.push(Fault {
                     recording: s.name.clone(),
                     channel: "drag_force_n".to_owned(),
-                    start_s: finite(s.time.first().copied().unwrap_or(0.0)),
-                    end_s: finite(s.time.last().copied().unwrap_or(0.0)),
+                    start_s: finite_or_zero(s.time.first().copied().unwrap_or(0.0)),
+                    end_s: finite_or_zero(s.time.last().copied().unwrap_or(0.0)),
                     what: if s.tyre_count() < 30 {
                         "too few usable samples for the tyre balance".to_owned()
                     } else {

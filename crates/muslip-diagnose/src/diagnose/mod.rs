@@ -232,8 +232,3 @@ impl Outcome<'_> {
             .collect()
     }
 }
-
-/// A number that every reader of the file can take.
-fn finite(x: f64) -> f64 {
-    if x.is_finite() { x } else { 0.0 }
-}

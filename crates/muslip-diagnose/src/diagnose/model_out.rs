@@ -2,7 +2,8 @@
 
 use nalgebra::DMatrix;
 
-use super::{Outcome, finite};
+use super::Outcome;
+use crate::omnibus::finite_or_zero;
 use crate::proof::Likelihood;
 use crate::repaired::{Domain, KnownRecording, NoiseModel, Repaired};
 use crate::tyre_stage;
@@ -16,12 +17,12 @@ impl Outcome<'_> {
         let data = self.data;
         let rows = |m: &DMatrix<f64>| -> Vec<Vec<f64>> {
             (0..m.nrows())
-                .map(|i| (0..m.ncols()).map(|j| finite(m[(i, j)])).collect())
+                .map(|i| (0..m.ncols()).map(|j| finite_or_zero(m[(i, j)])).collect())
                 .collect()
         };
         let stds = |m: &DMatrix<f64>| -> Vec<f64> {
             (0..m.nrows())
-                .map(|i| finite(m[(i, i)].max(0.0).sqrt()))
+                .map(|i| finite_or_zero(m[(i, i)].max(0.0).sqrt()))
                 .collect()
         };
         let start = tyre_stage::start(data).base;
@@ -99,9 +100,9 @@ impl Outcome<'_> {
             covariance: rows(tyre_covariance),
             dynamics_covariance: rows(dynamics_covariance),
             noise: NoiseModel {
-                sigma_n: finite(sigma),
+                sigma_n: finite_or_zero(sigma),
                 share_of_force: 0.0,
-                step_s: Some(finite(data.context.dt)),
+                step_s: Some(finite_or_zero(data.context.dt)),
                 channels: self
                     .noise()
                     .into_iter()
@@ -119,7 +120,7 @@ impl Outcome<'_> {
                 .iter()
                 .map(|s| KnownRecording {
                     path: s.name.clone(),
-                    first_time_s: finite(s.time.first().copied().unwrap_or(0.0)),
+                    first_time_s: finite_or_zero(s.time.first().copied().unwrap_or(0.0)),
                     samples: s.len() * data.averaged,
                     holdout: !self.split.by_block && self.split.proof_runs.contains(&s.index),
                 })

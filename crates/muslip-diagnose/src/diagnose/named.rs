@@ -2,11 +2,12 @@
 
 use nalgebra::DMatrix;
 
-use super::{Outcome, finite};
+use super::Outcome;
 use crate::choose::Search;
 use crate::confidence::{alternatives, figures, membership};
 use crate::fit::{Fitted, Joint};
 use crate::mechanism::Reported;
+use crate::omnibus::finite_or_zero;
 use crate::outcome::{Alternative, Evidence, Figure, NamedMechanism, Unexplained};
 use crate::separating::separating_test;
 use crate::tyre_stage::TyreStage;
@@ -66,14 +67,14 @@ impl Outcome<'_> {
                         .iter()
                         .map(|(r, std)| Figure {
                             name: r.name.to_owned(),
-                            value: finite(r.value),
-                            std: finite(*std).max(0.0),
+                            value: finite_or_zero(r.value),
+                            std: finite_or_zero(*std).max(0.0),
                             unit: r.unit.to_owned(),
                         })
                         .collect(),
                     evidence: Evidence {
-                        delta_bic: finite(2.0 * (drop - price)),
-                        holdout_nll_gain_per_sample: finite(gain),
+                        delta_bic: finite_or_zero(2.0 * (drop - price)),
+                        holdout_nll_gain_per_sample: finite_or_zero(gain),
                         confidence: confidence.clamp(0.0, 0.999),
                     },
                     confusable_with: others
@@ -84,7 +85,9 @@ impl Outcome<'_> {
                         })
                         .collect(),
                     separating_test: test,
-                    effect_sigma: finite((2.0 * drop.max(0.0) / search.count.max(1) as f64).sqrt()),
+                    effect_sigma: finite_or_zero(
+                        (2.0 * drop.max(0.0) / search.count.max(1) as f64).sqrt(),
+                    ),
                 },
             ));
         }
