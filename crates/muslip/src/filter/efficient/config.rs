@@ -1,6 +1,7 @@
 use core::fmt;
 
-use super::filter::{EfficientFilter, Estimate};
+use super::estimate::Estimate;
+use super::filter::EfficientFilter;
 use crate::filter::mu_slip::{Range, State};
 use crate::real::Real;
 
