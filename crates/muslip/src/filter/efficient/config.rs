@@ -1,7 +1,6 @@
 use core::fmt;
 
-use super::estimate::Estimate;
-use super::filter::EfficientFilter;
+use super::filter::{EfficientFilter, Estimate};
 use crate::filter::mu_slip::{Range, State};
 use crate::real::Real;
 

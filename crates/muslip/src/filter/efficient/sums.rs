@@ -4,8 +4,18 @@ use crate::real::Real;
 
 /// Terms of a row: powers of β from 0.
 pub(super) const TERMS: usize = 9;
-/// Factor of the last term of D, k + 1.
-const LAST_ORDER: f64 = 9.0;
+
+/// G_{k+1} = rise_k 2p G_k - fall_k G_{k-1} for k = 0..8: (k + 2)/(k + 1) and (k + 3)/(k + 1).
+const RECURRENCE: [(f64, f64); TERMS - 1] = [
+    (2.0, 3.0),
+    (1.5, 2.0),
+    (4.0 / 3.0, 5.0 / 3.0),
+    (1.25, 1.5),
+    (1.2, 1.4),
+    (7.0 / 6.0, 4.0 / 3.0),
+    (8.0 / 7.0, 9.0 / 7.0),
+    (1.125, 1.25),
+];
 
 /// Sums over samples: all that the likelihood needs.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -14,7 +24,7 @@ const LAST_ORDER: f64 = 9.0;
 pub(super) struct Sums<T> {
     /// A_k = Σ w z q U_k(p).
     pub friction: [T; TERMS],
-    /// B_k = Σ w q² U_k(p).
+    /// B_k = Σ w q² G_k(p).
     pub law: [T; TERMS],
     /// Σ w z².
     pub square: T,
@@ -66,18 +76,20 @@ impl<T: Real> Sums<T> {
     #[inline(always)]
     pub(super) fn add(&mut self, term: &Term<T>) {
         let twice_p = term.p + term.p;
-        // Both rows are U_k times their own factor.
         let (mut before, mut now) = (T::ZERO, term.weighted_friction * term.q);
         for sum in &mut self.friction {
-            let next = twice_p * now;
             *sum += now;
-            (before, now) = (now, next - before);
+            (before, now) = (now, twice_p * now - before);
         }
         let (mut before, mut now) = (T::ZERO, term.weight * (term.q * term.q));
-        for sum in &mut self.law {
-            let next = twice_p * now;
+        let mut rows = self.law.iter_mut();
+        if let Some(first) = rows.next() {
+            *first += now;
+        }
+        for (sum, (rise, fall)) in rows.zip(RECURRENCE) {
+            let next = T::from_f64(rise) * (twice_p * now) - T::from_f64(fall) * before;
+            (before, now) = (now, next);
             *sum += now;
-            (before, now) = (now, next - before);
         }
         self.square += term.weighted_friction * term.friction;
         self.count += T::ONE;
@@ -107,33 +119,32 @@ impl<T: Real> Sums<T> {
     /// The sums at β.
     #[inline(always)]
     pub(super) fn at(&self, beta: T) -> AtSlip<T> {
-        // Horner's rule with derivatives: c = Σ A_k β^k, d = Σ (k + 1) B_k β^k.
+        // Horner's rule with derivatives.
         let (mut c, mut c1) = (T::ZERO, T::ZERO);
         for &coefficient in self.friction.iter().rev() {
             c1 = c1 * beta + c;
             c = c * beta + coefficient;
         }
         let (mut d, mut d1, mut d2) = (T::ZERO, T::ZERO, T::ZERO);
-        let mut order = T::from_f64(LAST_ORDER);
         for &coefficient in self.law.iter().rev() {
-            let scaled = order * coefficient;
-            order -= T::ONE;
             d2 = d2 * beta + d1;
             d1 = d1 * beta + d;
-            d = d * beta + scaled;
+            d = d * beta + coefficient;
         }
-        // dβ/d ln sp = g/2 with g = 1 - β²; C = g c, D = g d, d² d/dβ² = 2 d2.
+        // dβ/d ln sp = g/2 with g = 1 - β²; C = g c, D = g² d, d² d/dβ² = 2 d2.
         let g = T::ONE - beta * beta;
-        let half_g = T::HALF * g;
-        let (law, gd1, bd) = (g * d, g * d1, beta * d);
-        // D'/2 = g (g d1 - 2 β d)/4
-        let law_half_slope = T::HALF * half_g * (gd1 - (bd + bd));
-        // D'' = g/2 (g² d2 - 3 β g d1 + (2 β² - g) d)
-        let second =
-            half_g * (g * g * d2 - T::from_f64(3.0) * (beta * gd1) + (beta * (bd + bd) - law));
+        let (u, v) = (g * d1, beta * d);
+        let law = g * g * d;
+        // D'/2 = g²(g d1 - 4 β d)/4
+        let law_half_slope = T::from_f64(0.25) * g * g * (u - T::from_f64(4.0) * v);
+        // D'' = g² (g² d2/2 - 5/2 β g d1 + (4 β² - g) d)
+        let second = g
+            * g
+            * (T::HALF * (g * g) * d2 - T::from_f64(2.5) * beta * u
+                + (T::from_f64(4.0) * (beta * beta) - g) * d);
         AtSlip {
             friction: g * c,
-            friction_slope: half_g * (g * c1 - T::TWO * beta * c),
+            friction_slope: T::HALF * g * (g * c1 - T::TWO * beta * c),
             law,
             law_half_slope,
             slip_information: (law + law + second) * T::from_f64(1.0 / 6.0),
