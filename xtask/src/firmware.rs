@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::PathBuf;
+use std::process::Command;
 
 use anyhow::{Context, Result, bail, ensure};
 
@@ -99,11 +100,8 @@ fn budgets_file() -> Result<BTreeMap<String, u64>> {
     figures(&fs::read_to_string(root().join(".ci/budgets.toml"))?)
 }
 
-/// Builds, checks and runs the image in QEMU; `write` puts the figures into the README.
-pub fn pil(arguments: &[String], write: bool) -> Result<()> {
-    setup::run_all()?;
-    budgets()?;
-    let path = target_folder().join("pil.figures");
+/// The processor in the loop, with its images.
+fn loop_command() -> Command {
     let mut pil = cargo(&[
         "run",
         "--release",
@@ -113,8 +111,17 @@ pub fn pil(arguments: &[String], write: bool) -> Result<()> {
         "pil",
         "--",
     ]);
-    pil.args([image_path("muslip-firmware"), image_path("panic-image")])
-        .arg("--figures")
+    pil.args([image_path("muslip-firmware"), image_path("panic-image")]);
+    pil
+}
+
+/// Builds, checks and runs the image in QEMU; `write` puts the figures into the README.
+pub fn pil(arguments: &[String], write: bool) -> Result<()> {
+    setup::run_all()?;
+    budgets()?;
+    let path = target_folder().join("pil.figures");
+    let mut pil = loop_command();
+    pil.arg("--figures")
         .arg(&path)
         .args(arguments)
         .env("RUST_BACKTRACE", "0");
@@ -134,17 +141,8 @@ pub fn pil(arguments: &[String], write: bool) -> Result<()> {
 pub fn serve(address: &str) -> Result<()> {
     setup::run_all()?;
     budgets()?;
-    let mut pil = cargo(&[
-        "run",
-        "--release",
-        "--locked",
-        "--quiet",
-        "--package",
-        "pil",
-        "--",
-    ]);
-    pil.args([image_path("muslip-firmware"), image_path("panic-image")])
-        .args(["--serve", address]);
+    let mut pil = loop_command();
+    pil.args(["--serve", address]);
     run("simulated rig", pil)
 }
 

@@ -53,28 +53,6 @@ const BACKWARD_RAD_S: f32 = 1.0;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct FaultSet(u32);
 
-/// In the order of their numbers, which is the order in which they are named.
-const ALL: [Fault; 18] = [
-    Fault::EmergencyStop,
-    Fault::WheelLocked,
-    Fault::Overspeed,
-    Fault::WheelSensorLost,
-    Fault::WheelSensorOutOfRange,
-    Fault::VehicleSensorLost,
-    Fault::VehicleSensorOutOfRange,
-    Fault::BridgeLost,
-    Fault::BridgeFrozen,
-    Fault::BridgeOutOfRange,
-    Fault::NormalForceLost,
-    Fault::LinkSilent,
-    Fault::EstimatorFault,
-    Fault::DeadlineMissed,
-    Fault::BrownOut,
-    Fault::Watchdog,
-    Fault::Clock,
-    Fault::Timeout,
-];
-
 impl FaultSet {
     /// Adds a fault where a condition holds.
     pub fn add_if(&mut self, holds: bool, fault: Fault) {
@@ -95,7 +73,7 @@ impl FaultSet {
 
     /// The fault that is named first.
     pub fn first(self) -> Option<Fault> {
-        ALL.into_iter().find(|&fault| self.contains(fault))
+        Fault::ALL.into_iter().find(|&fault| self.contains(fault))
     }
 
     /// One bit for each fault.

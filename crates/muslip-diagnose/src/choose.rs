@@ -309,14 +309,17 @@ fn extend(
     let data = joint.data();
     let count = joint.count();
     let first = beam.iter().all(|c| c.ids.is_empty());
+    let eligible: Vec<usize> = (0..data.catalogue.entries().len())
+        .filter(|entry| belongs(joint, *entry))
+        .collect();
     let mut jobs: Vec<(usize, usize)> = Vec::new();
     let evidences: Vec<Vec<Evidence>> = beam
         .iter()
         .map(|c| evidence(joint, &c.fitted.model))
         .collect();
     for (place, candidate) in beam.iter().enumerate() {
-        for entry in 0..data.catalogue.entries().len() {
-            if belongs(joint, entry) && !candidate.ids.contains(&data.catalogue.get(entry).id()) {
+        for &entry in &eligible {
+            if !candidate.ids.contains(&data.catalogue.get(entry).id()) {
                 jobs.push((place, entry));
             }
         }

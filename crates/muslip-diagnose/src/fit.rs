@@ -217,27 +217,36 @@ impl Problem<'_> {
     /// The same of one run, without the prior.
     fn normal_of(&self, model: &Model, run: usize) -> (DMatrix<f64>, DVector<f64>, f64) {
         let (e, columns) = self.jacobian(model, run);
-        let n = columns.len();
-        let mut information = DMatrix::zeros(n, n);
-        let mut gradient = DVector::zeros(n);
         let weights: Vec<f64> = e.iter().map(|e| weight(*e)).collect();
         let total = e.iter().map(|e| loss(*e)).sum::<f64>();
-        let mut weighted = vec![0.0; e.len()];
-        for i in 0..n {
-            for ((w, c), h) in weighted.iter_mut().zip(&columns[i]).zip(&weights) {
-                *w = c * h;
-            }
-            gradient[i] += dot(&weighted, &e);
-            for j in 0..=i {
-                let value = dot(&weighted, &columns[j]);
-                information[(i, j)] += value;
-                if i != j {
-                    information[(j, i)] += value;
-                }
-            }
-        }
+        let (information, gradient) = weighted_normal(&e, &weights, &columns);
         (information, gradient, total)
     }
+}
+
+/// Information matrix and gradient of weighted innovations and their derivatives.
+#[must_use]
+pub fn weighted_normal(
+    innovations: &[f64],
+    weights: &[f64],
+    columns: &[Vec<f64>],
+) -> (DMatrix<f64>, DVector<f64>) {
+    let n = columns.len();
+    let mut information = DMatrix::zeros(n, n);
+    let mut gradient = DVector::zeros(n);
+    let mut weighted = vec![0.0; innovations.len()];
+    for i in 0..n {
+        for ((w, c), h) in weighted.iter_mut().zip(&columns[i]).zip(weights) {
+            *w = c * h;
+        }
+        gradient[i] = dot(&weighted, innovations);
+        for j in 0..=i {
+            let value = dot(&weighted, &columns[j]);
+            information[(i, j)] = value;
+            information[(j, i)] = value;
+        }
+    }
+    (information, gradient)
 }
 
 /// Balances that are fitted together by one model: the tyre's alone, or wheel and vehicle.

@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-use crate::fit::{Problem, dot};
+use crate::fit::{Problem, dot, weighted_normal};
 use crate::model::Model;
 use crate::noise::weight;
 use crate::omnibus::Column;
@@ -48,32 +48,19 @@ impl<'a> Regression {
         let mut weights = Vec::new();
         let mut own = Vec::new();
         let count = model.vector().len();
-        let mut total_information = DMatrix::zeros(count, count);
-        let mut total_gradient = DVector::zeros(count);
+        let mut own_information = DMatrix::zeros(count, count);
+        let mut own_gradient = DVector::zeros(count);
         let mut by_run = Vec::new();
         for (e, columns) in parts {
             let w: Vec<f64> = e.iter().map(|e| weight(*e)).collect();
-            let mut own_information = DMatrix::zeros(count, count);
-            let mut own_gradient = DVector::zeros(count);
-            for i in 0..count {
-                let weighted: Vec<f64> = columns[i].iter().zip(&w).map(|(c, w)| c * w).collect();
-                own_gradient[i] += dot(&weighted, &e);
-                for j in 0..=i {
-                    let value = dot(&weighted, &columns[j]);
-                    own_information[(i, j)] += value;
-                    if i != j {
-                        own_information[(j, i)] += value;
-                    }
-                }
-            }
-            total_information += &own_information;
-            total_gradient += &own_gradient;
-            by_run.push((own_information, own_gradient));
+            let (information, gradient) = weighted_normal(&e, &w, &columns);
+            own_information += &information;
+            own_gradient += &gradient;
+            by_run.push((information, gradient));
             innovations.push(e);
             weights.push(w);
             own.push(columns);
         }
-        let (own_information, own_gradient) = (total_information, total_gradient);
         Self {
             innovations,
             weights,

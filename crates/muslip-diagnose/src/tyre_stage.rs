@@ -24,14 +24,10 @@ pub struct TyreStage {
     pub search: Search,
     /// The repaired model before any correction.
     pub model: Model,
-    /// The fit that the model came from.
-    pub fitted: Fitted,
     /// Dependences that no mechanism explains, claimed in the result.
     pub unexplained: Vec<Remainder>,
     /// Corrections carried by the repaired model: those claimed, and what the form of a named mechanism leaves.
     pub corrections: Vec<Remainder>,
-    /// Number of innovations fitted.
-    pub count: usize,
 }
 
 /// Fraction of a free dependence's gain that a set of mechanisms must reach to be preferred to it.
@@ -275,9 +271,9 @@ fn remainders(
             }
         }
     }
-    let fitted = found.chosen.fitted.clone();
+    let fitted = &found.chosen.fitted;
     let model = match corrections.first() {
-        Some(first) => match corrected(joint, &fitted, first) {
+        Some(first) => match corrected(joint, fitted, first) {
             Some((model, amended)) => {
                 corrections[0] = amended;
                 model
@@ -293,10 +289,8 @@ fn remainders(
         noise,
         search: found,
         model,
-        fitted,
         unexplained,
         corrections,
-        count,
     }
 }
 

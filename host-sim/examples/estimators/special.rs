@@ -18,7 +18,6 @@ pub fn tracking(seeds: u64) {
         "| memory, samples | samples after a step of mup from 0.8 to 0.3 until within 10 % for good: median, 95 % | lag behind a drift of 0.001 a sample, in samples |\n| --- | --- | --- |"
     );
     for memory in [10.0_f32, 20.0, 50.0] {
-        let slip = |i: u32| 0.21 - 0.19 * (f64::from(i) * 0.12 * std::f64::consts::TAU).cos();
         let config = efficient::Config::<f32> {
             memory: Some(memory),
             ..efficient::Config::for_range(Range::Automotive)
@@ -26,55 +25,27 @@ pub fn tracking(seeds: u64) {
         let mut settled: Vec<u32> = (0..seeds.min(2000))
             .into_par_iter()
             .map(|seed| {
-                let mut rng = ChaCha8Rng::seed_from_u64(seed);
-                let mut filter = config.build().unwrap();
-                let mut last_off = 0;
-                for i in 0..300_u32 {
-                    let mup = if i < 200 { 0.8 } else { 0.3 };
-                    let truth = Curve {
-                        peak_friction: mup,
-                        critical_slip: 0.15,
-                    };
-                    let friction =
-                        truth.friction(slip(i)) + 0.02 * rng.sample::<f64, _>(StandardNormal);
-                    let _ = filter.update(&FrictionMeasurement {
-                        slip_ratio: slip(i) as f32,
-                        friction: friction as f32,
-                        friction_std: 0.02,
-                    });
-                    if (200..260).contains(&i)
-                        && (f64::from(filter.state().peak_friction) / 0.3 - 1.0).abs() > 0.1
-                    {
-                        last_off = i - 199;
-                    }
-                }
-                last_off
+                let step = |i| if i < 200 { 0.8 } else { 0.3 };
+                tracked(&config, seed, 300, step)
+                    .iter()
+                    .enumerate()
+                    .filter(|(i, (mup, peak))| {
+                        (200..260).contains(i) && (peak / mup - 1.0).abs() > 0.1
+                    })
+                    .map(|(i, _)| i as u32 - 199)
+                    .next_back()
+                    .unwrap_or(0)
             })
             .collect();
         settled.sort_unstable();
         let lag: f64 = (0..200_u64)
             .into_par_iter()
             .map(|seed| {
-                let mut rng = ChaCha8Rng::seed_from_u64(seed);
-                let mut filter = config.build().unwrap();
-                let mut behind = 0.0;
-                for i in 0..600_u32 {
-                    let mup = 0.9 - 0.001 * f64::from(i);
-                    let truth = Curve {
-                        peak_friction: mup,
-                        critical_slip: 0.15,
-                    };
-                    let friction =
-                        truth.friction(slip(i)) + 0.02 * rng.sample::<f64, _>(StandardNormal);
-                    let _ = filter.update(&FrictionMeasurement {
-                        slip_ratio: slip(i) as f32,
-                        friction: friction as f32,
-                        friction_std: 0.02,
-                    });
-                    if i >= 200 {
-                        behind += (f64::from(filter.state().peak_friction) - mup) / 0.001 / 400.0;
-                    }
-                }
+                let drift = |i| 0.9 - 0.001 * f64::from(i);
+                let behind: f64 = tracked(&config, seed, 600, drift)[200..]
+                    .iter()
+                    .map(|(mup, peak)| (peak - mup) / 0.001 / 400.0)
+                    .sum();
                 behind / 200.0
             })
             .sum();
@@ -85,6 +56,33 @@ pub fn tracking(seeds: u64) {
         );
     }
     println!();
+}
+
+/// True and estimated peak friction after each sample of a stream whose peak friction is `mup(i)`.
+fn tracked(
+    config: &efficient::Config<f32>,
+    seed: u64,
+    samples: u32,
+    mup: impl Fn(u32) -> f64,
+) -> Vec<(f64, f64)> {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let mut filter = config.build().unwrap();
+    (0..samples)
+        .map(|i| {
+            let slip = 0.21 - 0.19 * (f64::from(i) * 0.12 * std::f64::consts::TAU).cos();
+            let truth = Curve {
+                peak_friction: mup(i),
+                critical_slip: 0.15,
+            };
+            let friction = truth.friction(slip) + 0.02 * rng.sample::<f64, _>(StandardNormal);
+            let _ = filter.update(&FrictionMeasurement {
+                slip_ratio: slip as f32,
+                friction: friction as f32,
+                friction_std: 0.02,
+            });
+            (truth.peak_friction, f64::from(filter.state().peak_friction))
+        })
+        .collect()
 }
 
 pub fn survival() {

@@ -258,27 +258,7 @@ fn print_status(status: &Status, terminal: &mut Terminal) -> Result<(), Failure>
 }
 
 fn standing(bits: u32) -> String {
-    let all = [
-        Fault::EmergencyStop,
-        Fault::WheelLocked,
-        Fault::Overspeed,
-        Fault::WheelSensorLost,
-        Fault::WheelSensorOutOfRange,
-        Fault::VehicleSensorLost,
-        Fault::VehicleSensorOutOfRange,
-        Fault::BridgeLost,
-        Fault::BridgeFrozen,
-        Fault::BridgeOutOfRange,
-        Fault::NormalForceLost,
-        Fault::LinkSilent,
-        Fault::EstimatorFault,
-        Fault::DeadlineMissed,
-        Fault::BrownOut,
-        Fault::Watchdog,
-        Fault::Clock,
-        Fault::Timeout,
-    ];
-    let names: Vec<String> = all
+    let names: Vec<String> = Fault::ALL
         .into_iter()
         .filter(|&fault| bits & (1 << fault as u8) != 0)
         .map(|fault| format!("{fault:?}"))

@@ -111,6 +111,34 @@ pub enum Channels {
     Rig,
 }
 
+/// Corrects a filter with the wheel's speed, where there is a reading of it.
+///
+/// # Errors
+/// [`StepError`] if the filter refuses it.
+pub(super) fn correct_with_wheel(
+    filter: &mut QuarterCarFilter<f64>,
+    readings: &Readings,
+    variance: f64,
+) -> Result<(), StepError> {
+    if let Some(value) = readings.wheel_speed_rad_s {
+        filter.update(&Measurement {
+            channel: Channel::WheelSpeed,
+            value,
+            variance,
+        })?;
+    }
+    Ok(())
+}
+
+/// What a controller is told of a filter's estimate.
+pub(super) fn slip_input(filter: &QuarterCarFilter<f64>) -> slip::Input<f64> {
+    slip::Input {
+        slip_ratio: filter.slip_ratio(),
+        vehicle_speed_m_s: filter.estimate().state.vehicle_speed_m_s,
+        tyre_torque_nm: filter.tyre_torque_nm(),
+    }
+}
+
 /// Corrects a filter with the three channels that a rig has and a car has not.
 ///
 /// # Errors

@@ -2,16 +2,14 @@
 
 use muslip::control::lock_guard::{self, LockGuard};
 use muslip::control::slip::{self, SlipController};
-use muslip::filter::quarter_car::{
-    Channel, Config, Measurement, QuarterCarFilter, Road as FilterRoad,
-};
+use muslip::filter::quarter_car::{Config, QuarterCarFilter, Road as FilterRoad};
 use muslip::law::{Burckhardt, TyreLaw};
 
 use super::SetupError;
 use super::car::Truth;
 use super::drivers::{
     Channels, NOMINAL, SETPOINT_SHARE, WHEEL_VARIANCE, act, belief_of, controller,
-    correct_with_rig, rolling_speed,
+    correct_with_rig, correct_with_wheel, rolling_speed, slip_input,
 };
 use super::run::{Belief, Driver, Readings};
 use super::scenario::{Road, Scenario, SensorNoise};
@@ -123,13 +121,7 @@ impl Filtered {
                 .set_setpoint_slip(SETPOINT_SHARE * law.peak().slip_ratio)?;
         }
         self.filter.predict(self.demanded_nm)?;
-        if let Some(value) = readings.wheel_speed_rad_s {
-            self.filter.update(&Measurement {
-                channel: Channel::WheelSpeed,
-                value,
-                variance: self.wheel_variance,
-            })?;
-        }
+        correct_with_wheel(&mut self.filter, readings, self.wheel_variance)?;
         if self.channels == Channels::Rig {
             correct_with_rig(&mut self.filter, readings, &self.noise)?;
         }
@@ -137,11 +129,7 @@ impl Filtered {
             &mut self.guard,
             &mut self.controller,
             readings,
-            &slip::Input {
-                slip_ratio: self.filter.slip_ratio(),
-                vehicle_speed_m_s: self.filter.estimate().state.vehicle_speed_m_s,
-                tyre_torque_nm: self.filter.tyre_torque_nm(),
-            },
+            &slip_input(&self.filter),
         )?;
         Ok(())
     }

@@ -2,16 +2,17 @@
 
 use muslip::control::lock_guard::{self, LockGuard};
 use muslip::control::peak_seeker::{self, PeakSeeker};
-use muslip::control::slip::{self, SlipController};
+use muslip::control::slip::SlipController;
 use muslip::filter::FrictionMeasurement;
-use muslip::filter::quarter_car::{
-    Channel, Config, Measurement, QuarterCarFilter, Road as FilterRoad,
-};
+use muslip::filter::quarter_car::{Config, QuarterCarFilter, Road as FilterRoad};
 use muslip::sample::{RigSample, SampleLimits, slip_friction};
 
 use super::SetupError;
 use super::car::Truth;
-use super::drivers::{NOMINAL, act, belief_of, controller, correct_with_rig, rolling_speed};
+use super::drivers::{
+    NOMINAL, act, belief_of, controller, correct_with_rig, correct_with_wheel, rolling_speed,
+    slip_input,
+};
 use super::run::{Belief, Driver, Readings};
 use super::scenario::{Scenario, SensorNoise};
 
@@ -58,14 +59,8 @@ impl RigDriven {
 
     fn try_demand(&mut self, readings: &Readings) -> Result<(), SetupError> {
         self.filter.predict(self.demanded_nm)?;
-        if let Some(value) = readings.wheel_speed_rad_s {
-            let sigma = self.noise.wheel_speed_rad_s;
-            self.filter.update(&Measurement {
-                channel: Channel::WheelSpeed,
-                value,
-                variance: sigma * sigma,
-            })?;
-        }
+        let sigma = self.noise.wheel_speed_rad_s;
+        correct_with_wheel(&mut self.filter, readings, sigma * sigma)?;
         correct_with_rig(&mut self.filter, readings, &self.noise)?;
         if self.setpoint == Setpoint::Sought {
             self.seek(readings)?;
@@ -74,11 +69,7 @@ impl RigDriven {
             &mut self.guard,
             &mut self.controller,
             readings,
-            &slip::Input {
-                slip_ratio: self.filter.slip_ratio(),
-                vehicle_speed_m_s: self.filter.estimate().state.vehicle_speed_m_s,
-                tyre_torque_nm: self.filter.tyre_torque_nm(),
-            },
+            &slip_input(&self.filter),
         )?;
         Ok(())
     }

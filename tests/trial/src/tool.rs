@@ -9,6 +9,7 @@ use anyhow::{Context, Result};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
+use crate::files::read_column;
 use crate::process::{Cost, run};
 
 /// Longest that one call may take.
@@ -130,26 +131,7 @@ impl Tool {
                 .to_owned();
             let mut predict = |base: bool| -> PathBuf {
                 let target = out.join(format!("{}-{file}", if base { "base" } else { "repaired" }));
-                let mut command = Command::new(&self.path);
-                command
-                    .arg("predict")
-                    .arg("--rig")
-                    .arg(&rig)
-                    .arg("--model")
-                    .arg(out.join("model.toml"))
-                    .arg("--out")
-                    .arg(&target);
-                if base {
-                    command.arg("--base");
-                }
-                command.arg(&fresh);
-                let answered = run(command, 1, PATIENCE, &out.join("predict.log"))
-                    .1
-                    .and_then(|()| {
-                        crate::files::read_column(&target, "drag_force_n")
-                            .map_err(|e| e.to_string())
-                    });
-                if let Err(complaint) = answered {
+                if let Err(complaint) = self.predict(&rig, &out, &fresh, &target, base) {
                     answer
                         .complaints
                         .push(format!("predict {file}: {complaint}"));
@@ -164,6 +146,35 @@ impl Tool {
             });
         }
         Ok(answer)
+    }
+
+    /// Predicts the drag of a run by the model in `out`, repaired or not, into `target`.
+    ///
+    /// # Errors
+    /// What the tool complained of, or why its answer cannot be read.
+    pub fn predict(
+        &self,
+        rig: &Path,
+        out: &Path,
+        fresh: &Path,
+        target: &Path,
+        base: bool,
+    ) -> Result<Vec<f64>, String> {
+        let mut command = Command::new(&self.path);
+        command
+            .arg("predict")
+            .arg("--rig")
+            .arg(rig)
+            .arg("--model")
+            .arg(out.join("model.toml"))
+            .arg("--out")
+            .arg(target);
+        if base {
+            command.arg("--base");
+        }
+        command.arg(fresh);
+        run(command, 1, PATIENCE, &out.join("predict.log")).1?;
+        read_column(target, "drag_force_n").map_err(|e| e.to_string())
     }
 }
 

@@ -2,6 +2,8 @@
 
 use std::collections::BTreeMap;
 
+use nalgebra::DMatrix;
+
 use super::Outcome;
 use crate::confidence::covariance;
 use crate::mechanism::Balance;
@@ -74,7 +76,7 @@ impl Outcome<'_> {
         robust_sigma(&all)
     }
 
-    pub(super) fn base(&self) -> BTreeMap<String, Estimate> {
+    pub(super) fn base(&self, repaired: &DMatrix<f64>) -> BTreeMap<String, Estimate> {
         let mut base = BTreeMap::new();
         let [peak, critical] = self.data.context.nominal;
         let mut put = |name: &str, value: f64, std: f64| {
@@ -96,8 +98,8 @@ impl Outcome<'_> {
                     p[1].exp(),
                     p[1].exp() * spread[(1, 1)].max(0.0).sqrt(),
                 );
-                if !stage.fitted.model.terms.is_empty() {
-                    let spread = covariance(&joint, &stage.fitted);
+                if !stage.search.chosen.ids.is_empty() {
+                    let spread = repaired;
                     let p = &stage.model.base;
                     put(
                         "repaired_peak_friction",

@@ -22,10 +22,10 @@ impl Outcome<'_> {
         let mut found: Vec<Interval> = Vec::new();
         let mut where_regions = Vec::new();
         if let Some(stage) = self.tyre
-            && (!stage.fitted.model.terms.is_empty() || !stage.corrections.is_empty())
+            && !(stage.search.chosen.ids.is_empty() && stage.corrections.is_empty())
         {
             let sigma = self.residual_sigma(stage);
-            let channel = if stage.fitted.model.ids(&data.catalogue) == [Id::EncoderRipple] {
+            let channel = if stage.search.chosen.ids == [Id::EncoderRipple] {
                 "wheel_speed_rad_s"
             } else {
                 "drag_force_n"

@@ -125,28 +125,15 @@ impl Outcome<'_> {
         let mut dynamics_covariance = DMatrix::zeros(0, 0);
         if let Some(stage) = self.tyre {
             let joint = self.tyre_joint(stage, false);
-            tyre_covariance = covariance(&joint, &stage.fitted);
+            tyre_covariance = covariance(&joint, &stage.search.chosen.fitted);
             let proof = self.tyre_joint(stage, true);
-            mechanisms.extend(self.named(
-                &joint,
-                &proof,
-                &stage.search,
-                &stage.fitted,
-                &tyre_covariance,
-            ));
+            mechanisms.extend(self.named(&joint, &proof, &stage.search, &tyre_covariance));
         }
         if let Some(stage) = self.dynamics {
             let joint = self.dynamics_joint(stage, false);
-            let fitted = &stage.search.chosen.fitted;
-            dynamics_covariance = covariance(&joint, fitted);
+            dynamics_covariance = covariance(&joint, &stage.search.chosen.fitted);
             let proof = self.dynamics_joint(stage, true);
-            mechanisms.extend(self.named(
-                &joint,
-                &proof,
-                &stage.search,
-                fitted,
-                &dynamics_covariance,
-            ));
+            mechanisms.extend(self.named(&joint, &proof, &stage.search, &dynamics_covariance));
         }
         mechanisms.sort_by(|a, b| b.0.total_cmp(&a.0));
         let mechanisms: Vec<NamedMechanism> = mechanisms.into_iter().map(|(_, m)| m).collect();
@@ -202,7 +189,7 @@ impl Outcome<'_> {
             verdict,
             recordings: self.recordings(),
             noise: self.noise(),
-            base: self.base(),
+            base: self.base(&tyre_covariance),
             r#where,
             regions,
             mechanisms,

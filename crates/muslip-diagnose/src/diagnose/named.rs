@@ -5,7 +5,7 @@ use nalgebra::DMatrix;
 use super::Outcome;
 use crate::choose::Search;
 use crate::confidence::{alternatives, figures, membership};
-use crate::fit::{Fitted, Joint};
+use crate::fit::Joint;
 use crate::mechanism::Reported;
 use crate::omnibus::finite_or_zero;
 use crate::outcome::{Alternative, Evidence, Figure, NamedMechanism, Unexplained};
@@ -19,10 +19,10 @@ impl Outcome<'_> {
         joint: &Joint<'_>,
         proof: &Joint<'_>,
         search: &Search,
-        fitted: &Fitted,
         covariance: &DMatrix<f64>,
     ) -> Vec<(f64, NamedMechanism)> {
         let data = self.data;
+        let fitted = &search.chosen.fitted;
         let membership = membership(search);
         let proof_count = proof.count().max(1) as f64;
         let with_all = proof.loss(&fitted.model);
@@ -31,13 +31,7 @@ impl Outcome<'_> {
             let mechanism = data.catalogue.get(term.entry);
             let id = mechanism.id();
             // What is lost without it, the others fitted anew.
-            let mut fewer = fitted.model.clone();
-            fewer.terms.remove(place);
-            let without = if fewer.terms.is_empty() && joint.is_tyre() {
-                search.base.fitted.clone()
-            } else {
-                joint.fit(&fewer, 12)
-            };
+            let without = joint.without(search, place);
             let drop = without.loss - fitted.loss;
             let price = crate::choose::price(&fitted.model, search.count)
                 - crate::choose::price(&without.model, search.count);
@@ -111,7 +105,7 @@ impl Outcome<'_> {
     }
 
     pub(super) fn unexplained_tyre(stage: &TyreStage) -> Vec<Unexplained> {
-        let explained = (stage.search.base.fitted.loss - stage.fitted.loss).max(0.0);
+        let explained = (stage.search.base.fitted.loss - stage.search.chosen.fitted.loss).max(0.0);
         stage
             .unexplained
             .iter()

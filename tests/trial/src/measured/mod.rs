@@ -298,19 +298,9 @@ fn frictions(tool: &Tool, folder: &Path, answers: &Path, table: &mut Table) -> R
         let drag = read_column(&circle[fresh], "drag_force_n")?;
         let error = |base: bool| -> Option<f64> {
             let target = out.join(if base { "base.csv" } else { "repaired.csv" });
-            let mut command = Command::new(&tool.path);
-            command.arg("predict").arg("--rig").arg(&rig);
-            command
-                .arg("--model")
-                .arg(out.join("model.toml"))
-                .arg("--out")
-                .arg(&target);
-            if base {
-                command.arg("--base");
-            }
-            command.arg(&circle[fresh]);
-            run(command, 1, PATIENCE, &out.join("predict.log")).1.ok()?;
-            let predicted = read_column(&target, "drag_force_n").ok()?;
+            let predicted = tool
+                .predict(&rig, &out, &circle[fresh], &target, base)
+                .ok()?;
             let squares: Vec<f64> = predicted
                 .iter()
                 .zip(&drag)
