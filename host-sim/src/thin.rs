@@ -45,6 +45,11 @@ impl<T> Thinned<T> {
         self.seen
     }
 
+    /// One of how many items is kept.
+    pub fn stride(&self) -> u64 {
+        self.stride
+    }
+
     /// What was kept, in the order of the stream.
     pub fn items(&self) -> &[T] {
         &self.items

@@ -11,7 +11,7 @@ use super::wording::{
     quantity, quantity_apart, range, short_name, sigmas, significant, spoken, stretch,
     unexplained_sentence, unseen, variable, verdict_sentence, with_unit,
 };
-use crate::report::{Block, KeyFigure, Report, Section, Tone};
+use crate::report::{Block, KeyFigure, Report, Section, Table, Tone};
 
 /// Most rows of the tables that grow with the recordings.
 const MOST_ROWS: usize = 24;
@@ -124,10 +124,7 @@ fn section(heading: &str, blocks: Vec<Block>) -> Section {
 }
 
 fn table<const N: usize>(head: [&str; N], rows: Vec<[String; N]>) -> Block {
-    Block::Table {
-        head: head.map(str::to_owned).into(),
-        rows: rows.into_iter().map(Vec::from).collect(),
-    }
+    Block::Table(Table::new(head, rows))
 }
 
 fn findings(diagnosis: &Diagnosis) -> Section {

@@ -3,6 +3,7 @@
 
 mod consistency;
 mod model;
+mod record;
 mod trace;
 
 use std::io::{self, Write};
@@ -21,20 +22,14 @@ use serde_json::json;
 
 pub use consistency::{Consistency, ConsistencyTest, Verdict, mean_nis_band};
 pub use model::{ModelUse, ModelledMechanism, Operation};
+pub use record::Record;
 pub use trace::{TraceFormat, TraceRow, TraceWriter};
 
 use crate::input_error::{InputError, InputProblem};
 use crate::measure::{FrictionNoise, Skipped, Survey, for_each_row};
 use crate::recording::{Recording, Row};
 use crate::rig_file::RigFile;
-use crate::thin::Thinned;
-
-/// Measured points that are kept for a picture.
-const PLOTTED_POINTS: usize = 2000;
-/// Estimates that are kept for a picture: all of the first ones, where most happens, ...
-const FIRST_STEPS: u64 = 60;
-/// ... and an even selection of the later ones.
-const PLOTTED_STEPS: usize = 500;
+use record::Recorder;
 
 /// Which filter estimates.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -66,17 +61,6 @@ pub struct EstimateOptions {
     pub range: Range,
 }
 
-/// One step of the estimate, kept for a picture.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Step {
-    /// Number of used samples so far.
-    pub sample: u64,
-    /// The estimate after them.
-    pub peak: PeakEstimate<f64>,
-    /// Normalised innovation squared of the last of them.
-    pub nis: f64,
-}
-
 /// What came out.
 #[derive(Debug, Clone)]
 pub struct EstimateResult {
@@ -96,10 +80,8 @@ pub struct EstimateResult {
     pub survey: Survey,
     /// Whether the filter was consistent.
     pub consistency: Consistency,
-    /// An even selection of the measured points (slip, friction).
-    pub points: Vec<(f64, f64)>,
-    /// The first steps, an even selection of the later ones, and the last.
-    pub steps: Vec<Step>,
+    /// What is kept of the run for pictures.
+    pub record: Record,
 }
 
 /// Why there is no estimate.
@@ -327,10 +309,7 @@ fn run<W: Write>(
     progress: &mut dyn FnMut(u64),
 ) -> Result<EstimateResult, EstimateError> {
     let mut test = ConsistencyTest::default();
-    let mut points = Thinned::new(PLOTTED_POINTS);
-    let mut steps = Vec::new();
-    let mut later_steps = Thinned::new(PLOTTED_STEPS);
-    let mut last_step = None;
+    let mut recorder = Recorder::new(filter.peak());
     let mut used = 0;
     let mut refused = 0;
     let mut outcome = Ok(());
@@ -338,29 +317,14 @@ fn run<W: Write>(
         let Some(measured) = front.measured(row, &survey, &filter.estimate().state) else {
             return Ok(());
         };
+        recorder.offered(&measured.measurement);
         let Some(fusion) = filter.update(&measured) else {
             refused += 1;
             return Ok(());
         };
         used += 1;
         test.add(fusion.innovation / fusion.innovation_variance.sqrt());
-        points.offer(|| {
-            (
-                measured.measurement.slip_ratio,
-                measured.measurement.friction,
-            )
-        });
-        let step = || Step {
-            sample: used,
-            peak: filter.peak(),
-            nis: fusion.nis,
-        };
-        if used <= FIRST_STEPS {
-            steps.push(step());
-        } else {
-            later_steps.offer(step);
-        }
-        last_step = Some(step());
+        recorder.used(measured.time_s, &fusion, || filter.peak());
         match &mut trace {
             Some(trace) => {
                 Ok(trace.row(&trace_row(measured.time_s, &fusion, &filter.estimate()))?)
@@ -380,12 +344,6 @@ fn run<W: Write>(
         let problem = InputProblem::NoUsableSample(skipped.in_words());
         return Err(InputError::whole_file(recording.path(), problem).into());
     };
-    steps.extend(later_steps.into_items());
-    if let Some(last) = last_step
-        && steps.last() != Some(&last)
-    {
-        steps.push(last);
-    }
     Ok(EstimateResult {
         options,
         estimator: EstimatorKind::Article,
@@ -395,8 +353,7 @@ fn run<W: Write>(
         model: None,
         survey,
         consistency,
-        points: points.into_items(),
-        steps,
+        record: recorder.finish(),
     })
 }
 

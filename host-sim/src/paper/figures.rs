@@ -1,12 +1,16 @@
 //! The article's figures, drawn from one stream.
 
-use muslip::filter::mu_slip::{Range, State};
+use muslip::filter::PeakEstimate;
+use muslip::filter::mu_slip::{Estimate, Range, State};
 
 use super::exact::{equal_sensitivity_slips, slip_of_extremum};
 use super::pass::{PassError, Step, first_start, traced};
-use super::stream::{TRUTH, frictions, slips};
+use super::stream::{FRICTION_STD, TRUTH, frictions, slips};
+use crate::estimate::{ConsistencyTest, EstimatorKind};
 use crate::fit::Curve;
-use crate::report::{AnimationFrame, Axis, Extent, Figure, Ink, Shape, ellipse};
+use crate::report::{
+    Axis, Convergence, CurveLabel, Extent, Figure, Frame, Ink, Sample, Shape, Update, ellipse,
+};
 
 /// A figure with the name of its file, without ending, and the heading that it stands under.
 #[derive(Debug, Clone, PartialEq)]
@@ -65,20 +69,64 @@ pub fn figures(seed: u64) -> Result<Vec<NamedFigure>, PassError> {
     all.push(named("result", Part::Convergence, result(&steps)));
     all.extend(STILLS.iter().map(|&index| {
         let name = format!("convergence-{index:02}");
-        named(&name, Part::Convergence, convergence(index, &steps).figure)
+        named(&name, Part::Convergence, still(index, &steps))
     }));
     Ok(all)
 }
 
-/// One frame a measurement, from the first to the last, of the stream of this seed.
+/// The run over the stream of this seed, with a frame for each measurement.
 ///
 /// # Errors
 /// As for [`figures`].
-pub fn convergence_frames(seed: u64) -> Result<Vec<AnimationFrame>, PassError> {
-    let steps = traced(first_start(Range::Aircraft), &frictions(TRUTH, seed))?;
-    Ok((0..steps.len())
-        .map(|index| convergence(index, &steps))
-        .collect())
+pub fn convergence(seed: u64) -> Result<Convergence, PassError> {
+    let start = first_start(Range::Aircraft);
+    let steps = traced(start, &frictions(TRUTH, seed))?;
+    let peak_of = |estimate: &Estimate<f64>| {
+        let (peak_friction_std, critical_slip_std) = estimate.covariance.std();
+        PeakEstimate {
+            peak_friction: estimate.state.peak_friction,
+            peak_friction_std,
+            critical_slip: estimate.state.critical_slip,
+            critical_slip_std,
+            correlation: estimate.covariance.correlation(),
+        }
+    };
+    let mut frames = vec![Frame {
+        sample: 0,
+        peak: peak_of(&start),
+        update: None,
+    }];
+    let mut test = ConsistencyTest::default();
+    for (step, sample) in steps.iter().zip(1..) {
+        let fusion = &step.fusion;
+        test.add(fusion.innovation / fusion.innovation_variance.sqrt());
+        frames.push(Frame {
+            sample,
+            peak: peak_of(&step.estimate),
+            update: Some(Update::new(f64::NAN, fusion)),
+        });
+    }
+    Ok(Convergence {
+        used: steps.len() as u64,
+        samples: along(&steps, |step| step.fusion.measured_friction)
+            .into_iter()
+            .map(|(slip, friction)| Sample {
+                slip,
+                friction,
+                friction_std: FRICTION_STD,
+            })
+            .collect(),
+        stride: 1,
+        frames,
+        consistency: test.outcome().ok_or(PassError::Empty)?,
+        truth: Some(CurveLabel {
+            name: "true curve".into(),
+            points: points_of(TRUTH),
+        }),
+        again: Some(EstimatorKind::Article),
+        about_what_if: "Change what the filter assumes and it runs again over the same points, here in the page."
+            .into(),
+    })
 }
 
 fn slip_axis() -> Axis {
@@ -378,7 +426,7 @@ fn result(steps: &[Step]) -> Figure {
     figure
 }
 
-fn convergence(index: usize, steps: &[Step]) -> AnimationFrame {
+fn still(index: usize, steps: &[Step]) -> Figure {
     let measured = |range: &[Step]| {
         range
             .iter()
@@ -395,7 +443,6 @@ fn convergence(index: usize, steps: &[Step]) -> AnimationFrame {
     .with(Ink::Reference, "to come", Shape::Points(measured(to_come)))
     .with(Ink::Truth, "true curve", Shape::Line(points_of(TRUTH)))
     .with(Ink::Measured, "measured", Shape::Points(measured(so_far)));
-    let mut note = String::new();
     if let Some(step) = so_far.last() {
         let state = step.estimate.state;
         let covariance = step.estimate.covariance;
@@ -404,7 +451,7 @@ fn convergence(index: usize, steps: &[Step]) -> AnimationFrame {
             peak_friction: state.peak_friction,
             critical_slip: state.critical_slip,
         };
-        note = format!(
+        figure.caption = format!(
             "After measurement {index} of {last}, slip {:.4}: peak friction {:.3}\u{a0}±\u{a0}{:.3}, critical \
              slip {:.3}\u{a0}±\u{a0}{:.3}, correlation {:.2}.",
             step.fusion.slip_ratio,
@@ -414,7 +461,6 @@ fn convergence(index: usize, steps: &[Step]) -> AnimationFrame {
             slip_std,
             covariance.correlation()
         );
-        figure.caption.clone_from(&note);
         figure = figure
             .with(
                 Ink::Estimate,
@@ -428,7 +474,7 @@ fn convergence(index: usize, steps: &[Step]) -> AnimationFrame {
                 Shape::Marker((state.critical_slip, state.peak_friction), String::new()),
             );
     }
-    AnimationFrame { figure, note }
+    figure
 }
 
 #[cfg(test)]
@@ -446,24 +492,12 @@ mod tests {
     }
 
     #[test]
-    fn the_animation_has_a_frame_a_measurement_and_moves_a_point_each_time() {
-        let frames = convergence_frames(1).unwrap();
-        assert_eq!(frames.len(), 41);
-        let measured = |frame: &AnimationFrame| {
-            frame
-                .figure
-                .layers
-                .iter()
-                .filter(|layer| layer.ink == Ink::Measured)
-                .map(|layer| match &layer.shape {
-                    Shape::Points(points) => points.len(),
-                    _ => 0,
-                })
-                .sum::<usize>()
-        };
-        for (index, frame) in frames.iter().enumerate() {
-            assert_eq!(measured(frame), index + 1);
-            assert!(frame.note.contains(&format!("measurement {index} of 40")));
-        }
+    fn the_animation_has_a_frame_a_measurement_after_the_start() {
+        let run = convergence(1).unwrap();
+        assert_eq!(run.samples.len(), 41);
+        let numbers: Vec<u64> = run.frames.iter().map(|frame| frame.sample).collect();
+        assert_eq!(numbers, (0..=41).collect::<Vec<_>>());
+        let start = run.frames[0].peak;
+        assert_eq!((start.peak_friction, start.critical_slip_std), (0.6, 0.2));
     }
 }

@@ -29,7 +29,7 @@ pub use bound::Bound;
 pub use exact::{
     DirectMeasurement, direct_measurement, equal_sensitivity_slips, gradient, slip_of_extremum,
 };
-pub use figures::{NamedFigure, Part, convergence_frames, figures};
+pub use figures::{NamedFigure, Part, convergence, figures};
 pub use monte_carlo::{ArticleStream, Course, Regression, SecondStart};
 pub use pages::{CONVERGENCE_PAGE, article_markdown, convergence_page, report_page};
 pub use pass::{PassError, Step, first_start, second_start, traced};

@@ -1,6 +1,6 @@
 //! The report, the animation and the page of the documentation.
 
-use super::figures::{Part, convergence_frames, figures};
+use super::figures::{Part, convergence, figures};
 use super::pass::PassError;
 use super::statement::Verdict;
 use super::table::Table;
@@ -126,7 +126,8 @@ pub fn report_page(paper: &Paper) -> Result<Report, PassError> {
 /// # Errors
 /// As for [`report_page`].
 pub fn convergence_page(options: PaperOptions) -> Result<Report, PassError> {
-    let frames = convergence_frames(options.seed)?;
+    let run = convergence(options.seed)?;
+    let (head, rows) = run.table();
     Ok(Report {
         title: TITLE.into(),
         subject: SUBJECT.into(),
@@ -136,7 +137,13 @@ pub fn convergence_page(options: PaperOptions) -> Result<Report, PassError> {
         key_figures: Vec::new(),
         sections: vec![Section {
             heading: format!("Convergence, noise of seed {}", options.seed),
-            blocks: vec![Block::Animation(frames)],
+            blocks: vec![
+                Block::Convergence(Box::new(run)),
+                Block::Folded {
+                    summary: "The frames as a table".into(),
+                    table: crate::report::Table::new(head, rows),
+                },
+            ],
         }],
         command: options.command(),
     })
@@ -188,10 +195,6 @@ fn table_block(table: Table) -> Block {
         _ => cell,
     };
     let rows = table.rows.into_iter();
-    Block::Table {
-        head: table.head,
-        rows: rows
-            .map(|row| row.into_iter().map(unbroken).collect())
-            .collect(),
-    }
+    let rows = rows.map(|row| row.into_iter().map(unbroken));
+    Block::Table(crate::report::Table::new(table.head, rows))
 }

@@ -16,6 +16,9 @@ pub enum PassError {
     /// An update was refused.
     #[error("an update was refused: {0}")]
     Update(#[from] UpdateError),
+    /// The stream has no point.
+    #[error("the stream has no point")]
+    Empty,
 }
 
 /// What the filter holds after a point, and what that point did.

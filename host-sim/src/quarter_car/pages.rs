@@ -280,10 +280,9 @@ pub fn report_page(study: &Study) -> Result<Report, SetupError> {
     }
     for (heading, paragraphs, table) in parts(study)? {
         let mut blocks: Vec<Block> = paragraphs.into_iter().map(Block::Paragraph).collect();
-        blocks.push(Block::Table {
-            head: table.head,
-            rows: table.rows,
-        });
+        blocks.push(Block::Table(crate::report::Table::new(
+            table.head, table.rows,
+        )));
         sections.push(Section {
             heading: heading.into(),
             blocks,

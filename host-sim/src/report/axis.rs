@@ -63,6 +63,14 @@ impl Axis {
         }
         .filter(|position| position.is_finite())
     }
+
+    /// The values at two positions.
+    pub(super) fn values(&self, (low, high): (f64, f64)) -> (f64, f64) {
+        match self.scale {
+            Scale::Linear => (low, high),
+            Scale::Logarithmic => (10f64.powf(low), 10f64.powf(high)),
+        }
+    }
 }
 
 /// Ticks of an axis from `low` to `high` (positions), about `count` of them, with their labels.

@@ -3,22 +3,14 @@
 use std::path::Path;
 
 use super::axis::{Axis, Extent};
-use super::figure::{Figure, Ink, Shape, ellipse};
+use super::convergence::{Convergence, CurveLabel, Frame, Update};
+use super::figure::{Figure, Ink, Live, Shape};
 use super::page::{Block, KeyFigure, Report, Section, Tone};
+use super::table::Table;
 use crate::estimate::{EstimateResult, Verdict, range_word};
-use crate::fit::Curve;
 use crate::wording::{
     consistency_sentence, estimate_sentence, model_sentences, noise_sentence, plus_minus,
 };
-
-/// A curve to draw beside the estimate, under its name in the legend.
-#[derive(Debug, Clone, PartialEq)]
-pub struct CurveLabel {
-    /// Name in the legend.
-    pub name: String,
-    /// Points (slip, friction) of the curve.
-    pub points: Vec<(f64, f64)>,
-}
 
 /// The report of an estimate: the curve, how the estimate settled, whether to believe it.
 ///
@@ -51,8 +43,13 @@ pub fn of_estimate(
         .flat_map(model_sentences)
         .map(Block::Paragraph)
         .collect();
-    curve.push(Block::Figure(curve_figure(result, beside)));
-    curve.push(Block::Figure(peak_figure(result)));
+    let run = convergence(result, beside);
+    let (head, rows) = run.table();
+    curve.push(Block::Convergence(Box::new(run)));
+    curve.push(Block::Folded {
+        summary: "The frames of the animation as a table".into(),
+        table: Table::new(head, rows),
+    });
     Report {
         title: "Peak friction estimate".into(),
         subject: format!(
@@ -82,7 +79,7 @@ pub fn of_estimate(
         ],
         sections: vec![
             Section {
-                heading: "The curve".into(),
+                heading: "The estimate, measurement by measurement".into(),
                 blocks: curve,
             },
             Section {
@@ -91,19 +88,19 @@ pub fn of_estimate(
             },
             Section {
                 heading: "Is the filter consistent?".into(),
-                blocks: vec![
-                    Block::Paragraph(consistency_sentence(consistency, result.estimator)),
-                    Block::Figure(nis_figure(result)),
-                ],
+                blocks: [Block::Paragraph(consistency_sentence(
+                    consistency,
+                    result.estimator,
+                ))]
+                .into_iter()
+                .chain(consistency_figures(result).map(Block::Figure))
+                .collect(),
             },
             Section {
                 heading: "Samples".into(),
                 blocks: vec![
                     Block::Paragraph(noise_sentence(&result.survey)),
-                    Block::Table {
-                        head: vec!["samples".into(), "count".into()],
-                        rows: samples,
-                    },
+                    Block::Table(Table::new(["samples", "count"], samples)),
                 ],
             },
         ],
@@ -111,168 +108,214 @@ pub fn of_estimate(
     }
 }
 
-/// Slips at which a curve is drawn: dense where it bends.
-fn drawn_slips(largest: f64) -> impl Iterator<Item = f64> {
-    const STEPS: u32 = 160;
-    (0..=STEPS).map(move |step| largest * (f64::from(step) / f64::from(STEPS)).powi(2))
-}
-
-fn largest_slip(result: &EstimateResult) -> f64 {
-    let largest = result
-        .points
-        .iter()
-        .map(|point| point.0)
-        .fold(0.0, f64::max);
-    // At least to a little beyond the peak, at most to the locked wheel and its noise.
-    largest
-        .max(1.5 * result.peak.critical_slip)
-        .clamp(0.05, 1.05)
-}
-
-/// Points (x, y) of a line.
-type LinePoints = Vec<(f64, f64)>;
-/// Points (x, low, high) of a band.
-type BandPoints = Vec<(f64, f64, f64)>;
-
-/// The curve of the estimate and the 1-sigma of its friction, sqrt(H P H'), at each slip.
-fn curve_and_band(result: &EstimateResult) -> (LinePoints, BandPoints) {
-    let peak = &result.peak;
-    let curve = Curve {
-        peak_friction: peak.peak_friction,
-        critical_slip: peak.critical_slip,
-    };
-    let (sigma_peak, sigma_slip) = (peak.peak_friction_std, peak.critical_slip_std);
-    drawn_slips(largest_slip(result))
-        .map(|slip| {
-            let friction = curve.friction(slip);
-            let (by_peak, by_slip) = curve.gradient(slip);
-            let (a, b) = (by_peak * sigma_peak, by_slip * sigma_slip);
-            let sigma = (a * a + 2.0 * peak.correlation * a * b + b * b)
-                .max(0.0)
-                .sqrt();
-            ((slip, friction), (slip, friction - sigma, friction + sigma))
-        })
-        .unzip()
-}
-
-fn curve_figure(result: &EstimateResult, beside: Option<&CurveLabel>) -> Figure {
-    let peak = &result.peak;
-    let (curve, band) = curve_and_band(result);
-    let thinned = if (result.points.len() as u64) < result.used {
-        format!(" ({} of {} shown)", result.points.len(), result.used)
+/// The run for the player.
+fn convergence(result: &EstimateResult, beside: Option<&CurveLabel>) -> Convergence {
+    let record = &result.record;
+    let thinned = if record.stride > 1 {
+        format!(
+            " Every {}. of {} measurements is in the page, so that its own run differs a little from the \
+             command's.",
+            record.stride, result.used
+        )
     } else {
         String::new()
     };
-    let mut figure = Figure::new(
-        format!("Measured friction against slip{thinned}, and the estimated curve with its 1-sigma band."),
-        Axis::new("slip").over(Extent::Including(0.0)),
-        Axis::new("friction coefficient").over(Extent::Including(0.0)),
-    )
-    .with(Ink::Measured, "measured", Shape::Points(result.points.clone()))
-    .with(Ink::Estimate, "1-sigma", Shape::Band(band));
-    if let Some(beside) = beside {
-        figure = figure.with(
-            Ink::Truth,
-            &beside.name,
-            Shape::Dashes(beside.points.clone()),
-        );
+    Convergence {
+        frames: record.frames.clone(),
+        samples: record.samples.clone(),
+        stride: record.stride,
+        used: result.used,
+        consistency: result.consistency,
+        truth: beside.cloned(),
+        // What a compensated reading is expected to be depends on the filter's state, sample by sample.
+        again: result.model.is_none().then_some(result.estimator),
+        about_what_if: format!(
+            "Change what the filter assumes and it runs again, here in the page: the same code that runs on the \
+             rig.{thinned}"
+        ),
     }
-    figure
-        .with(Ink::Estimate, "estimated curve", Shape::Line(curve))
-        .with(
-            Ink::Estimate,
-            "peak",
-            Shape::Marker((peak.critical_slip, peak.peak_friction), String::new()),
-        )
 }
 
-fn peak_figure(result: &EstimateResult) -> Figure {
-    let peak = &result.peak;
-    let outline = ellipse(
-        (peak.critical_slip, peak.peak_friction),
-        (peak.critical_slip_std, peak.peak_friction_std),
-        peak.correlation,
-    );
-    // Three sigma around, and round it the last steps of the estimate's way there.
-    let around = |value: f64, std: f64| Extent::Fixed(value - 3.2 * std, value + 3.2 * std);
-    let way = result
-        .steps
-        .iter()
-        .map(|step| (step.peak.critical_slip, step.peak.peak_friction))
-        .collect();
-    Figure::new(
-        "The peak with its 1-sigma ellipse, and the way the estimate took to it.",
-        Axis::new("critical slip").over(around(peak.critical_slip, peak.critical_slip_std)),
-        Axis::new("peak friction").over(around(peak.peak_friction, peak.peak_friction_std)),
-    )
-    .with(Ink::Estimate, "1-sigma ellipse", Shape::Outline(outline))
-    .with(Ink::Reference, "way of the estimate", Shape::Line(way))
-    .with(
-        Ink::Estimate,
-        "final estimate",
-        Shape::Marker((peak.critical_slip, peak.peak_friction), String::new()),
-    )
+/// Layers along the frames.
+struct Along<'a>(&'a [Frame]);
+
+impl Along<'_> {
+    fn line(&self, of: impl Fn(&Frame) -> f64) -> Shape {
+        Shape::Line(self.points(of))
+    }
+
+    fn points(&self, of: impl Fn(&Frame) -> f64) -> Vec<(f64, f64)> {
+        self.0
+            .iter()
+            .map(|frame| (frame.sample as f64, of(frame)))
+            .collect()
+    }
+
+    fn of_update(&self, of: impl Fn(&Update) -> f64) -> Vec<(f64, f64)> {
+        self.points(|frame| frame.update.as_ref().map_or(f64::NAN, &of))
+    }
+
+    fn band(&self, of: impl Fn(&Frame) -> (f64, f64)) -> Shape {
+        let band = self.0.iter().map(|frame| {
+            let (value, std) = of(frame);
+            (frame.sample as f64, value - std, value + std)
+        });
+        Shape::Band(band.collect())
+    }
 }
 
-fn settling_figures(result: &EstimateResult) -> [Figure; 2] {
-    let figure = |caption: &str, label: &str, of: fn(&crate::estimate::Step) -> (f64, f64)| {
-        let last = result.steps.last().map_or((0.0, 0.0), of);
-        let band = result
-            .steps
-            .iter()
-            .map(|step| {
-                let (value, std) = of(step);
-                (step.sample as f64, value - std, value + std)
-            })
-            .collect();
-        let line = result
-            .steps
-            .iter()
-            .map(|step| (step.sample as f64, of(step).0))
-            .collect();
-        Figure::new(
-            caption,
-            Axis::new("samples used").logarithmic(),
-            Axis::new(label),
-        )
-        .with(Ink::Estimate, "1-sigma", Shape::Band(band))
-        .with(Ink::Estimate, "estimate", Shape::Line(line))
-        .with(Ink::Reference, "final value", Shape::Level(last.0))
+fn measurements() -> Axis {
+    Axis::new("measurement")
+}
+
+fn settling_figures(result: &EstimateResult) -> [Figure; 4] {
+    let frames = &result.record.frames;
+    let along = Along(frames);
+    let figure = |caption: &str, label: &str| {
+        Figure::new(caption, measurements().logarithmic(), Axis::new(label))
     };
-    [
-        figure(
-            "Peak friction after each sample.",
-            "peak friction",
-            |step| (step.peak.peak_friction, step.peak.peak_friction_std),
-        ),
-        figure(
-            "Critical slip after each sample.",
-            "critical slip",
-            |step| (step.peak.critical_slip, step.peak.critical_slip_std),
-        ),
-    ]
+    let settled = |figure: Figure, live: [Live; 2], of: fn(&Frame) -> (f64, f64)| {
+        let last = frames.last().map_or(f64::NAN, |frame| of(frame).0);
+        figure
+            .with_live(live[0], Ink::Estimate, "1-sigma", along.band(of))
+            .with_live(
+                live[1],
+                Ink::Estimate,
+                "estimate",
+                along.line(|frame| of(frame).0),
+            )
+            .with(
+                Ink::Reference,
+                "final value of the command",
+                Shape::Level(last),
+            )
+    };
+    let peak = settled(
+        figure("Peak friction after each measurement.", "peak friction").named("peak-friction"),
+        [Live::PeakFrictionBand, Live::PeakFriction],
+        |frame| (frame.peak.peak_friction, frame.peak.peak_friction_std),
+    );
+    let slip = settled(
+        figure("Critical slip after each measurement.", "critical slip").named("critical-slip"),
+        [Live::CriticalSlipBand, Live::CriticalSlip],
+        |frame| (frame.peak.critical_slip, frame.peak.critical_slip_std),
+    );
+    let start = frames.first().map(|frame| frame.peak);
+    let share = |std: fn(&Frame) -> f64| {
+        let at_start = frames.first().map_or(f64::NAN, std);
+        along.line(move |frame| (std(frame) / at_start).powi(2))
+    };
+    let mut variances = figure(
+        "Variances after each measurement over those at the start, and the correlation of the two (the \
+         article's Figure 1).",
+        "share of the start; correlation",
+    )
+    .named("figure-1-variances")
+    .with(Ink::Reference, "", Shape::Level(0.0));
+    if start.is_some_and(|start| start.peak_friction_std.is_finite()) {
+        variances = variances
+            .with_live(
+                Live::PeakFrictionVariance,
+                Ink::Estimate,
+                "variance of peak friction",
+                share(|frame| frame.peak.peak_friction_std),
+            )
+            .with_live(
+                Live::CriticalSlipVariance,
+                Ink::Measured,
+                "variance of critical slip",
+                share(|frame| frame.peak.critical_slip_std),
+            );
+    }
+    let variances = variances.with_live(
+        Live::Correlation,
+        Ink::Truth,
+        "correlation",
+        along.line(|frame| frame.peak.correlation),
+    );
+    let line = |of: fn(&Update) -> f64| Shape::Line(along.of_update(of));
+    let signal = Figure::new(
+        "What each measurement could tell, H P H' before and after it, and the variance of its noise (the \
+         article's Figure 2).",
+        measurements().logarithmic(),
+        Axis::new("variance of friction").logarithmic(),
+    )
+    .named("figure-2-signal-and-noise")
+    .with_live(
+        Live::SignalBefore,
+        Ink::Estimate,
+        "signal before",
+        line(|update| update.signal_before),
+    )
+    .with_live(
+        Live::SignalAfter,
+        Ink::Second,
+        "signal after",
+        line(|update| update.signal_after),
+    )
+    .with_live(
+        Live::Noise,
+        Ink::Measured,
+        "noise",
+        line(|update| update.noise_variance),
+    );
+    [peak, slip, variances, signal]
 }
 
-fn nis_figure(result: &EstimateResult) -> Figure {
-    let points = result
-        .steps
-        .iter()
-        .map(|step| (step.sample as f64, step.nis))
-        .collect();
-    let consistency = &result.consistency;
-    let ends = [
-        1.0,
-        result.steps.last().map_or(1.0, |step| step.sample as f64),
-    ];
-    let band = ends
-        .map(|sample| (sample, consistency.nis_low, consistency.nis_high))
-        .into();
-    Figure::new(
-        "Normalised innovation squared of each sample. A consistent filter's mean lies in the band.",
-        Axis::new("samples used"),
-        Axis::new("innovation squared / its variance").over(Extent::Including(0.0)),
+fn consistency_figures(result: &EstimateResult) -> [Figure; 2] {
+    /// 95 % of squares of standard normal numbers lie below this.
+    const BELOW: f64 = 3.841;
+    let frames = &result.record.frames;
+    let along = Along(frames);
+    let band = along.band(|frame| {
+        let variance = frame.update.map_or(f64::NAN, |u| u.innovation_variance);
+        (0.0, 2.0 * variance.sqrt())
+    });
+    let innovations = Figure::new(
+        "Innovations, measured minus predicted friction. Of a consistent filter's, 95 % lie in the band, in no \
+         order.",
+        measurements(),
+        Axis::new("innovation (friction)"),
     )
-    .with(Ink::Reference, "95 % band of the mean", Shape::Band(band))
-    .with(Ink::Measured, "each sample", Shape::Points(points))
-    .with(Ink::Estimate, "mean", Shape::Level(consistency.mean_nis))
+    .named("innovations")
+    .with_live(Live::InnovationBand, Ink::Reference, "2-sigma", band)
+    .with(Ink::Reference, "", Shape::Level(0.0))
+    .with_live(
+        Live::Innovation,
+        Ink::Measured,
+        "innovation",
+        Shape::Points(along.of_update(|update| update.innovation)),
+    );
+    let consistency = &result.consistency;
+    let ends = [0.0, frames.last().map_or(1.0, |frame| frame.sample as f64)];
+    let band = ends.map(|sample| (sample, consistency.nis_low, consistency.nis_high));
+    let nis = Figure::new(
+        "Normalised innovation squared of each measurement. A consistent filter's mean lies in the band.",
+        measurements(),
+        Axis::new("innovation\u{b2} / its variance").over(Extent::Including(0.0)),
+    )
+    .named("normalised-innovations")
+    .with(
+        Ink::Reference,
+        "95 % band of the mean",
+        Shape::Band(band.into()),
+    )
+    .with(
+        Ink::Reference,
+        "95 % of them lie below",
+        Shape::Level(BELOW),
+    )
+    .with_live(
+        Live::Nis,
+        Ink::Measured,
+        "each",
+        Shape::Points(along.of_update(|update| update.nis)),
+    )
+    .with_live(
+        Live::NisMean,
+        Ink::Estimate,
+        "mean",
+        Shape::Level(consistency.mean_nis),
+    );
+    [innovations, nis]
 }

@@ -26,6 +26,57 @@ pub struct Layer {
     pub ink: Ink,
     /// Its entry in the legend; none where empty.
     pub label: String,
+    /// What of a filter's run it shows, where the page's player may move it.
+    pub live: Option<Live>,
+}
+
+/// What of a filter's run a layer shows.
+///
+/// The page computes such a layer anew, for the frame that is shown or for a run with other assumptions;
+/// `templates/convergence.js` has one entry for each of these.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, serde::Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Live {
+    /// Points up to the frame.
+    Measured,
+    /// The frame's curve.
+    Curve,
+    /// Its 1-sigma band.
+    CurveBand,
+    /// The frame's 1-sigma ellipse.
+    Ellipse,
+    /// Its centre.
+    Peak,
+    /// The way of the estimate up to the frame.
+    Way,
+    /// Peak friction of every frame.
+    PeakFriction,
+    /// Its 1-sigma band.
+    PeakFrictionBand,
+    /// Critical slip of every frame.
+    CriticalSlip,
+    /// Its 1-sigma band.
+    CriticalSlipBand,
+    /// Innovation of every frame.
+    Innovation,
+    /// Two sigma either side of nought.
+    InnovationBand,
+    /// Normalised innovation squared of every frame.
+    Nis,
+    /// Its mean over the run.
+    NisMean,
+    /// Variance of peak friction over that at the start.
+    PeakFrictionVariance,
+    /// Variance of critical slip over that at the start.
+    CriticalSlipVariance,
+    /// Correlation of the two.
+    Correlation,
+    /// H P H' before each update.
+    SignalBefore,
+    /// H P H' after it.
+    SignalAfter,
+    /// Noise variance of each measurement.
+    Noise,
 }
 
 /// Shapes, in the coordinates of the axes.
@@ -45,11 +96,50 @@ pub enum Shape {
     Marker((f64, f64), String),
     /// A dashed level across the figure.
     Level(f64),
+    /// A map: coloured cells between edges.
+    Cells(Cells),
+}
+
+/// Values over the cells of a grid, coloured from one ink over paper at nought to another.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Cells {
+    /// Edges of the columns, ascending, one more than columns.
+    pub x_edges: Vec<f64>,
+    /// Edges of the rows, ascending, one more than rows.
+    pub y_edges: Vec<f64>,
+    /// Values row by row; NaN where there is none.
+    pub values: Vec<f64>,
+    /// The value that has the full colour, on either side of nought.
+    pub limit: f64,
+    /// Unit of the values.
+    pub unit: String,
+}
+
+impl Cells {
+    /// Every cell with a value: its ends along, its ends up, the value.
+    pub(super) fn cells(&self) -> impl Iterator<Item = ([f64; 2], [f64; 2], f64)> + '_ {
+        self.y_edges
+            .windows(2)
+            .enumerate()
+            .flat_map(move |(row, up)| {
+                let columns = self.x_edges.len().saturating_sub(1);
+                let values = self.values.iter().skip(row * columns);
+                self.x_edges
+                    .windows(2)
+                    .zip(values)
+                    .filter(|(_, value)| value.is_finite())
+                    .filter_map(move |(along, &value)| {
+                        Some((along.try_into().ok()?, up.try_into().ok()?, value))
+                    })
+            })
+    }
 }
 
 /// A figure.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Figure {
+    /// Name of its file where it is written for a document; empty where it has none of its own.
+    pub name: String,
     /// What the figure is, for the reader of the page and for those who cannot see it.
     pub caption: String,
     /// Along.
@@ -64,11 +154,18 @@ impl Figure {
     /// An empty figure.
     pub fn new(caption: impl Into<String>, x: Axis, y: Axis) -> Self {
         Self {
+            name: String::new(),
             caption: caption.into(),
             x,
             y,
             layers: Vec::new(),
         }
+    }
+
+    /// The same figure with a name for its file.
+    pub fn named(self, name: impl Into<String>) -> Self {
+        let name = name.into();
+        Self { name, ..self }
     }
 
     /// The same figure with one layer more, in front of the others.
@@ -77,8 +174,24 @@ impl Figure {
             shape,
             ink,
             label: label.into(),
+            live: None,
         });
         self
+    }
+
+    /// As [`Figure::with`], for a layer that the page's player may move.
+    pub fn with_live(self, live: Live, ink: Ink, label: impl Into<String>, shape: Shape) -> Self {
+        let mut figure = self.with(ink, label, shape);
+        if let Some(layer) = figure.layers.last_mut() {
+            layer.live = Some(live);
+        }
+        figure
+    }
+
+    /// The ranges of both axes in their own units, never empty.
+    pub(super) fn extents(&self) -> ((f64, f64), (f64, f64)) {
+        let (along, up) = self.ranges();
+        (self.x.values(along), self.y.values(up))
     }
 
     /// Ranges of both axes as positions (logarithms where the axis is logarithmic), never empty.
@@ -122,6 +235,10 @@ impl Shape {
                 up.drawn.push(point.1);
             }
             Self::Level(level) => up.drawn.push(*level),
+            Self::Cells(cells) => {
+                along.drawn.extend(&cells.x_edges);
+                up.drawn.extend(&cells.y_edges);
+            }
         }
     }
 }

@@ -1,9 +1,16 @@
 //! A report as one HTML page.
 
 use askama::Template;
+use base64::Engine as _;
+use base64::engine::general_purpose::STANDARD as BASE64;
+use serde_json::Value;
+use sha2::{Digest as _, Sha256};
 
-use super::figure::Figure;
-use super::svg::{DrawError, Size, for_page};
+use super::convergence::Convergence;
+use super::figure::{Figure, Shape};
+use super::spec::{alternative, ink_word, of_figure, shape_word};
+use super::svg::DrawError;
+use super::table::Table;
 
 /// How a verdict is meant, which is its colour on the page.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -58,19 +65,23 @@ pub struct Section {
 /// A piece of a section.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Block {
+    /// A heading within the section.
+    Heading(String),
     /// Text.
     Paragraph(String),
-    /// A table with a head; all rows are as long as the head.
-    Table {
-        /// Heads of the columns.
-        head: Vec<String>,
-        /// Rows.
-        rows: Vec<Vec<String>>,
+    /// A table.
+    Table(Table),
+    /// A table that the reader unfolds.
+    Folded {
+        /// What is in it.
+        summary: String,
+        /// The table.
+        table: Table,
     },
-    /// A figure with its caption.
+    /// A figure with its caption; several in a row share lines where there is room.
     Figure(Figure),
-    /// Figures one after the other, at the reader's pace.
-    Animation(Vec<AnimationFrame>),
+    /// A filter's run, frame by frame, at the reader's pace; one a page.
+    Convergence(Box<Convergence>),
     /// A link to a file beside the page.
     Link {
         /// What the reader sees.
@@ -79,21 +90,6 @@ pub enum Block {
         target: String,
     },
 }
-
-/// One picture of an animation.
-#[derive(Debug, Clone, PartialEq)]
-pub struct AnimationFrame {
-    /// The picture; all frames of an animation should have the same axes and legend.
-    pub figure: Figure,
-    /// What the reader is told below it.
-    pub note: String,
-}
-
-/// Plays animations; the only script that a page may hold.
-const ANIMATION_SCRIPT: &str = include_str!("../../templates/animation.js");
-
-/// What the page's content security policy lets run: this script and no other.
-const ANIMATION_SCRIPT_HASH: &str = "sha256-FKBn/1121JJdcHjHY1QEL3LNvF78AsGHa0xfNPsPzbk=";
 
 /// A report that could not be made.
 #[derive(Debug, thiserror::Error)]
@@ -106,6 +102,17 @@ pub enum ReportError {
     Page(#[from] askama::Error),
 }
 
+const STYLE: &str = concat!(
+    include_str!("../../vendor/uplot/uPlot.min.css"),
+    "\n",
+    include_str!("../../templates/report.css")
+);
+const UPLOT: &str = include_str!("../../vendor/uplot/uPlot.iife.min.js");
+const FIGURES: &str = include_str!("../../templates/figures.js");
+const CONVERGENCE: &str = include_str!("../../templates/convergence.js");
+const WHAT_IF: &str = include_str!("../../templates/what-if.js");
+const SORT: &str = include_str!("../../templates/sort.js");
+
 #[derive(Template)]
 #[template(path = "report.html")]
 struct Page<'a> {
@@ -113,9 +120,11 @@ struct Page<'a> {
     verdict: String,
     tone: &'static str,
     sections: Vec<DrawnSection<'a>>,
-    animated: bool,
-    script: &'static str,
-    script_hash: &'static str,
+    policy: String,
+    style: &'static str,
+    /// Blocks of data: id, type, text.
+    data: Vec<(&'static str, &'static str, String)>,
+    scripts: Vec<&'static str>,
     version: &'static str,
 }
 
@@ -125,57 +134,197 @@ struct DrawnSection<'a> {
 }
 
 enum DrawnBlock<'a> {
+    Heading(&'a str),
     Paragraph(&'a str),
-    Table {
-        head: &'a [String],
-        rows: &'a [Vec<String>],
+    Table(DrawnTable<'a>),
+    Folded {
+        summary: &'a str,
+        table: DrawnTable<'a>,
     },
-    Figure {
-        wide: String,
-        narrow: String,
-        caption: &'a str,
-    },
-    Animation(Vec<DrawnFrame<'a>>),
+    Figures(Vec<DrawnFigure>),
+    Player(Player<'a>),
     Link {
         text: &'a str,
         target: &'a str,
     },
 }
 
-struct DrawnFrame<'a> {
-    wide: String,
-    narrow: String,
-    note: &'a str,
+#[derive(Template)]
+#[template(path = "table.html")]
+struct DrawnTable<'a> {
+    /// What assistive technology calls it.
+    name: &'a str,
+    table: &'a Table,
+}
+
+#[derive(Template)]
+#[template(path = "figure.html")]
+struct DrawnFigure {
+    id: String,
+    figure: Figure,
+    /// Shape, ink and label of each entry.
+    legend: Vec<(&'static str, &'static str, String)>,
+    /// Ends of a map's colours.
+    ramp: Option<(String, String)>,
+    alternative: String,
+}
+
+#[derive(Template)]
+#[template(path = "player.html")]
+struct Player<'a> {
+    figures: Vec<DrawnFigure>,
+    last: usize,
+    what_if: Option<WhatIf<'a>>,
+}
+
+struct WhatIf<'a> {
+    about: &'a str,
+    efficient: bool,
+    peak_friction: f64,
+    critical_slip: f64,
+}
+
+/// What the scripts of a page are given.
+#[derive(Default)]
+struct PageData {
+    figures: Vec<Value>,
+    convergence: Option<Value>,
+    core: Option<&'static str>,
+    sortable: bool,
+}
+
+impl PageData {
+    fn figure(&mut self, figure: &Figure, id: String) -> DrawnFigure {
+        self.figures.push(of_figure(figure, &id));
+        let layers = figure.layers.iter();
+        DrawnFigure {
+            id,
+            figure: figure.clone(),
+            legend: layers
+                .clone()
+                .filter(|layer| !layer.label.is_empty() && !matches!(layer.shape, Shape::Cells(_)))
+                .map(|layer| {
+                    (
+                        shape_word(&layer.shape),
+                        ink_word(layer.ink),
+                        layer.label.clone(),
+                    )
+                })
+                .collect(),
+            ramp: layers
+                .filter_map(|layer| match &layer.shape {
+                    Shape::Cells(cells) => Some((
+                        format!("\u{2212}{:.3} {}", cells.limit, cells.unit),
+                        format!("+{:.3} {}", cells.limit, cells.unit),
+                    )),
+                    _ => None,
+                })
+                .next(),
+            alternative: alternative(figure),
+        }
+    }
+
+    fn player<'a>(&mut self, convergence: &'a Convergence) -> Player<'a> {
+        let [curve, close_up] = convergence.figures();
+        let figures = vec![
+            self.figure(&curve, "player-curve".into()),
+            self.figure(&close_up, "player-ellipse".into()),
+        ];
+        self.convergence = Some(convergence.data());
+        self.core = convergence.core();
+        let start = convergence.frames.first().map(|frame| frame.peak);
+        let what_if = start.filter(|_| self.core.is_some()).map(|start| WhatIf {
+            about: &convergence.about_what_if,
+            efficient: convergence.again == Some(crate::estimate::EstimatorKind::Efficient),
+            peak_friction: start.peak_friction,
+            critical_slip: start.critical_slip,
+        });
+        Player {
+            figures,
+            last: convergence.frames.len().saturating_sub(1),
+            what_if,
+        }
+    }
+
+    fn table<'a>(&mut self, name: &'a str, table: &'a Table) -> DrawnTable<'a> {
+        self.sortable |= table.sortable;
+        DrawnTable { name, table }
+    }
+
+    fn scripts(&self) -> Vec<&'static str> {
+        let mut scripts = Vec::new();
+        if !self.figures.is_empty() {
+            scripts.extend([UPLOT, FIGURES]);
+        }
+        if self.convergence.is_some() {
+            scripts.push(CONVERGENCE);
+        }
+        if self.core.is_some() {
+            scripts.push(WHAT_IF);
+        }
+        if self.sortable {
+            scripts.push(SORT);
+        }
+        scripts
+    }
+
+    /// Blocks of data: id, type, text.
+    fn blocks(self) -> Vec<(&'static str, &'static str, String)> {
+        const JSON: &str = "application/json";
+        let mut blocks = Vec::new();
+        if !self.figures.is_empty() {
+            blocks.push(("figures", JSON, in_script(&Value::Array(self.figures))));
+        }
+        if let Some(convergence) = &self.convergence {
+            blocks.push(("convergence", JSON, in_script(convergence)));
+        }
+        if let Some(core) = self.core {
+            blocks.push(("core", "application/wasm-base64", core.to_owned()));
+        }
+        blocks
+    }
+}
+
+/// JSON that cannot end the element that it stands in.
+fn in_script(value: &Value) -> String {
+    value.to_string().replace('<', "\\u003c")
+}
+
+/// A source by its hash, as a content-security policy names it.
+fn hash(text: &str) -> String {
+    format!("'sha256-{}'", BASE64.encode(Sha256::digest(text)))
+}
+
+/// The page's content-security policy: nothing from anywhere, and of what is inside only this.
+fn policy(scripts: &[&str], wasm: bool) -> String {
+    let mut sources: Vec<String> = scripts.iter().map(|script| hash(script)).collect();
+    if wasm {
+        sources.push("'wasm-unsafe-eval'".into());
+    }
+    let scripts = if sources.is_empty() {
+        String::new()
+    } else {
+        format!("; script-src {}", sources.join(" "))
+    };
+    format!(
+        "default-src 'none'; style-src {}{scripts}; base-uri 'none'; form-action 'none'",
+        hash(STYLE)
+    )
 }
 
 impl Report {
-    /// The page: self-contained, all text escaped, without script unless it holds an animation.
+    /// The page: self-contained, all text escaped, nothing running but the scripts that its policy names.
     ///
     /// # Errors
-    /// [`ReportError`] if a figure cannot be drawn or the page cannot be put together; neither depends
-    /// on what a recording holds.
+    /// [`ReportError`] if the page cannot be put together; that does not depend on what a recording holds.
     pub fn to_html(&self) -> Result<String, ReportError> {
-        let mut sections = Vec::with_capacity(self.sections.len());
-        for section in &self.sections {
-            let mut blocks = Vec::with_capacity(section.blocks.len());
-            for block in &section.blocks {
-                blocks.push(match block {
-                    Block::Paragraph(text) => DrawnBlock::Paragraph(text),
-                    Block::Table { head, rows } => DrawnBlock::Table { head, rows },
-                    Block::Figure(figure) => DrawnBlock::Figure {
-                        wide: for_page(figure, Size::Wide)?,
-                        narrow: for_page(figure, Size::Narrow)?,
-                        caption: &figure.caption,
-                    },
-                    Block::Animation(frames) => DrawnBlock::Animation(drawn_frames(frames)?),
-                    Block::Link { text, target } => DrawnBlock::Link { text, target },
-                });
-            }
-            sections.push(DrawnSection {
-                heading: &section.heading,
-                blocks,
-            });
-        }
+        let mut data = PageData::default();
+        let sections: Vec<DrawnSection<'_>> = self
+            .sections
+            .iter()
+            .map(|section| drawn(section, &mut data))
+            .collect();
+        let scripts = data.scripts();
         let page = Page {
             report: self,
             // A value and its uncertainty stay on one line.
@@ -185,40 +334,50 @@ impl Report {
                 Tone::Neutral => "neutral",
                 Tone::Warning => "warning",
             },
-            animated: self.is_animated(),
-            script: ANIMATION_SCRIPT,
-            script_hash: ANIMATION_SCRIPT_HASH,
+            policy: policy(&scripts, data.core.is_some()),
+            style: STYLE,
+            data: data.blocks(),
+            scripts,
             sections,
             version: env!("CARGO_PKG_VERSION"),
         };
         Ok(page.render()?)
     }
-
-    fn is_animated(&self) -> bool {
-        self.sections
-            .iter()
-            .flat_map(|section| &section.blocks)
-            .any(|block| matches!(block, Block::Animation(_)))
-    }
 }
 
-fn drawn_frames(frames: &[AnimationFrame]) -> Result<Vec<DrawnFrame<'_>>, DrawError> {
-    frames
-        .iter()
-        .map(|frame| {
-            Ok(DrawnFrame {
-                wide: for_page(&frame.figure, Size::Wide)?,
-                narrow: for_page(&frame.figure, Size::Narrow)?,
-                note: &frame.note,
-            })
-        })
-        .collect()
+fn drawn<'a>(section: &'a Section, data: &mut PageData) -> DrawnSection<'a> {
+    let mut blocks: Vec<DrawnBlock<'_>> = Vec::with_capacity(section.blocks.len());
+    let heading = &section.heading;
+    for block in &section.blocks {
+        let next = match block {
+            Block::Heading(text) => DrawnBlock::Heading(text),
+            Block::Paragraph(text) => DrawnBlock::Paragraph(text),
+            Block::Table(table) => DrawnBlock::Table(data.table(heading, table)),
+            Block::Folded { summary, table } => DrawnBlock::Folded {
+                summary,
+                table: data.table(summary, table),
+            },
+            Block::Figure(figure) => {
+                let id = format!("figure-{}", data.figures.len() + 1);
+                let figure = data.figure(figure, id);
+                if let Some(DrawnBlock::Figures(row)) = blocks.last_mut() {
+                    row.push(figure);
+                    continue;
+                }
+                DrawnBlock::Figures(vec![figure])
+            }
+            Block::Convergence(convergence) => DrawnBlock::Player(data.player(convergence)),
+            Block::Link { text, target } => DrawnBlock::Link { text, target },
+        };
+        blocks.push(next);
+    }
+    DrawnSection { heading, blocks }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::report::{Axis, Ink, Shape};
+    use crate::report::{Axis, Ink};
 
     fn report(text: &str) -> Report {
         let figure = Figure::new(text, Axis::new(text), Axis::new(text)).with(
@@ -226,6 +385,7 @@ mod tests {
             text,
             Shape::Marker((0.0, 0.0), text.into()),
         );
+        let table = Table::new([text], vec![[text.to_owned()]]);
         Report {
             title: text.into(),
             subject: text.into(),
@@ -240,9 +400,14 @@ mod tests {
                 heading: text.into(),
                 blocks: vec![
                     Block::Paragraph(text.into()),
-                    Block::Table {
-                        head: vec![text.into()],
-                        rows: vec![vec![text.into()]],
+                    Block::Table(table.clone()),
+                    Block::Folded {
+                        summary: text.into(),
+                        table,
+                    },
+                    Block::Link {
+                        text: text.into(),
+                        target: text.into(),
                     },
                     Block::Figure(figure),
                 ],
@@ -253,10 +418,19 @@ mod tests {
 
     #[test]
     fn text_from_a_recording_cannot_become_markup() {
-        let page = report("<script>alert(1)</script>\" onload=\"x")
+        let usual = report("text").to_html().unwrap();
+        let page = report("</script><script>alert(1)</script>\" onload=\"x")
             .to_html()
             .unwrap();
-        assert!(!page.contains("<script"), "{page}");
+        assert_eq!(
+            page.matches("<script").count(),
+            usual.matches("<script").count()
+        );
+        assert_eq!(
+            page.matches("</script").count(),
+            usual.matches("</script").count()
+        );
+        assert!(!page.contains("alert(1)</"));
         assert!(!page.contains("\" onload=\"x"));
     }
 
@@ -264,31 +438,39 @@ mod tests {
     fn the_page_needs_nothing_from_outside_and_says_so() {
         let page = report("text").to_html().unwrap();
         assert!(page.contains("Content-Security-Policy") && page.contains("default-src 'none'"));
-        for outside in ["http://", "https://", "src=", "url(", "@import"] {
+        for outside in [
+            " src=",
+            "url(",
+            "@import",
+            "fetch(",
+            "XMLHttpRequest",
+            " style=",
+        ] {
             assert!(!page.contains(outside), "{outside}");
         }
     }
 
     #[test]
-    fn the_only_script_is_the_one_that_the_policy_names() {
-        use base64::Engine;
-        use sha2::Digest;
-        let digest = sha2::Sha256::digest(ANIMATION_SCRIPT);
-        let hash = base64::engine::general_purpose::STANDARD.encode(digest);
-        assert_eq!(ANIMATION_SCRIPT_HASH, format!("sha256-{hash}"));
+    fn the_policy_names_every_script_and_the_style_sheet_by_what_they_are() {
+        let page = report("text").to_html().unwrap();
+        let (_, rest) = page
+            .split_once("Content-Security-Policy\" content=\"")
+            .unwrap();
+        let policy = rest.split('"').next().unwrap().replace("&#39;", "'");
+        for (open, close) in [("<style>", "</style>"), ("<script>", "</script>")] {
+            for part in page.split(open).skip(1) {
+                let text = part.split(close).next().unwrap();
+                assert!(policy.contains(&hash(text)), "{open}");
+            }
+        }
+        assert!(!policy.contains("unsafe"), "{policy}");
+    }
 
+    #[test]
+    fn a_page_without_plots_runs_no_script() {
         let mut still = report("text");
-        assert!(!still.to_html().unwrap().contains("script"));
-        let frame = AnimationFrame {
-            figure: Figure::new("<b>", Axis::new("x"), Axis::new("y")),
-            note: "<script>alert(1)</script>".into(),
-        };
-        still.sections[0].blocks = vec![Block::Animation(vec![frame.clone(), frame])];
+        still.sections[0].blocks.truncate(3);
         let page = still.to_html().unwrap();
-        assert!(page.contains(&format!("script-src '{ANIMATION_SCRIPT_HASH}';")));
-        assert!(page.contains(&format!("<script>{ANIMATION_SCRIPT}</script>")));
-        assert_eq!(page.matches("<script").count(), 1);
-        // All frames but the last are hidden, for readers whose browser runs no script.
-        assert_eq!(page.matches("class=\"frame\" hidden").count(), 1);
+        assert!(!page.contains("<script") && !page.contains("script-src"));
     }
 }

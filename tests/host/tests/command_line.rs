@@ -74,12 +74,12 @@ fn the_demo_writes_its_files_and_says_where_and_how() {
     let scratch = Scratch::new();
     insta::assert_snapshot!("demo_words", scratch.output(&["demo"]));
     let report = scratch.read("muslip-demo/report.html");
-    assert!(report.contains("Friction peaks at") && report.contains("<svg"));
+    assert!(report.contains("Friction peaks at") && report.contains("player-curve"));
     assert!(scratch.read("muslip-demo/trace.csv").lines().count() > 1000);
     assert!(
         scratch
             .read("muslip-demo/found/report.html")
-            .contains("<svg")
+            .contains("id=\"figure-1\"")
     );
     // The command that it prints works as printed.
     let words = scratch.output(&["demo"]);
@@ -325,4 +325,26 @@ fn a_report_of_a_hostile_name_holds_no_markup_of_it() {
     scratch.output(&["estimate", "--rig", "rig.toml", "--report", "r.html", name]);
     let page = scratch.read("r.html");
     assert!(!page.contains("<img") && page.contains("img src=x"));
+}
+
+#[test]
+fn a_page_of_five_thousand_samples_stays_below_two_megabytes() {
+    let scratch = scratch();
+    let mut text = String::from(HEADER);
+    for step in 0..5000 {
+        let time = f64::from(step) * 0.002;
+        let slip = f64::from(step % 500) / 500.0;
+        let friction = 0.105 * slip / (0.0225 + slip * slip) + 0.01 * f64::from(step % 7);
+        text += &format!(
+            "\n{time:.4},{:.5},30,{:.3},1000",
+            100.0 * (1.0 - slip),
+            1000.0 * friction
+        );
+    }
+    scratch.write("long.csv", text + "\n");
+    scratch.output(&[
+        "estimate", "--rig", "rig.toml", "--report", "r.html", "long.csv",
+    ]);
+    let bytes = scratch.read("r.html").len();
+    assert!((100_000..2_000_000).contains(&bytes), "{bytes}");
 }

@@ -131,7 +131,7 @@ fn every_digit_of_a_number_survives_the_files() {
 }
 
 #[test]
-fn the_report_shows_every_part_and_runs_no_script() {
+fn the_report_shows_every_part_and_without_plots_runs_no_script() {
     let page = page::report(&partly_explained(), "muslip diagnose <x>")
         .to_html()
         .unwrap();
