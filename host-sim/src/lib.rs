@@ -1,6 +1,7 @@
 //! Rig simulator, recordings and reports behind the `muslip` command.
 #![forbid(unsafe_code)]
 
+pub mod campaign;
 pub mod cli;
 pub mod demo;
 pub mod diagnose;

@@ -25,11 +25,18 @@ struct Tool {
 }
 
 /// Programs that the tests call.
-const TOOLS: &[Tool] = &[Tool {
-    program: "qemu-system-arm",
-    package: "qemu-system-arm",
-    needed_for: "the firmware's runs",
-}];
+const TOOLS: &[Tool] = &[
+    Tool {
+        program: "qemu-system-arm",
+        package: "qemu-system-arm",
+        needed_for: "the firmware's runs",
+    },
+    Tool {
+        program: "chromium",
+        package: "chromium",
+        needed_for: "the tests of the pages",
+    },
+];
 
 /// Programs that the cycles table calls.
 const CYCLES_TOOLS: &[Tool] = &[

@@ -112,6 +112,8 @@ pub fn run_all() -> Result<()> {
 fn tests(name: &str, mut command: Command) -> Result<Tally> {
     step(name, || {
         let mut child = command
+            // The browser is installed by now: tests of the pages may not be left out.
+            .env("MUSLIP_PAGES_MUST_RUN", "1")
             .stdout(Stdio::piped())
             .spawn()
             .with_context(|| format!("cannot start {command:?}"))?;

@@ -8,11 +8,12 @@ use muslip_diagnose::ablation::Ablation;
 use muslip_diagnose::outcome::Diagnosis;
 
 use super::Failure;
+use super::diagnose::diagnosed;
 use super::estimate::{Job, tell};
 use super::terminal::Terminal;
 use crate::demo;
-use crate::diagnose::summary::summary;
-use crate::diagnose::{job, load};
+use crate::diagnose::job;
+use crate::diagnose::summary::{WIDEST_LINE, summary};
 use crate::estimate::{EstimateOptions, EstimatorKind};
 use crate::output::{create_folder, write_file};
 use crate::wording::estimate_sentence;
@@ -43,6 +44,7 @@ pub(super) fn run(arguments: &Arguments, terminal: &mut Terminal) -> Result<(), 
         },
         trace: Some(&trace),
         report: Some(&report),
+        format: None,
         beside: Some(demo::truth()),
     };
     let result = job.run()?;
@@ -88,8 +90,7 @@ fn find_concealed(folder: &Path, terminal: &mut Terminal) -> Result<(), Failure>
         recordings.push(path);
     }
     job::prepare_folder(&found)?;
-    let loaded = load::campaign(&rig, &recordings, &|_| {})?;
-    let diagnosis = job::run(loaded, Ablation::default(), &|_, _| {});
+    let (diagnosis, views) = diagnosed(&rig, &recordings, Ablation::default())?;
     let shown: Vec<String> = recordings
         .iter()
         .map(|path| path.display().to_string())
@@ -99,12 +100,12 @@ fn find_concealed(folder: &Path, terminal: &mut Terminal) -> Result<(), Failure>
         rig.display(),
         shown.join(" ")
     );
-    job::write(&found, &diagnosis, &command)?;
+    job::write(&found, &diagnosis, &views, &command)?;
     terminal.line("")?;
     terminal.line("Four recordings of another rig, of other physics than the simulation: one effect was concealed in")?;
     terminal.line("them. What the simulation leaves out of them:")?;
     terminal.line("")?;
-    let summary = summary(&diagnosis, &found);
+    let summary = summary(&diagnosis, &found, terminal.width(WIDEST_LINE));
     for line in &summary.verdict {
         terminal.verdict(line, summary.good)?;
     }

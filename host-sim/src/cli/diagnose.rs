@@ -5,13 +5,16 @@ use std::sync::{Mutex, PoisonError};
 
 use clap::Args;
 use muslip_diagnose::ablation::{Ablation, Part};
+use muslip_diagnose::outcome::Diagnosis;
 
 use super::Failure;
 use super::progress::Progress;
 use super::terminal::Terminal;
 use crate::diagnose::job::{self, WriteError};
-use crate::diagnose::load;
-use crate::diagnose::summary::summary;
+use crate::diagnose::summary::{WIDEST_LINE, summary};
+use crate::diagnose::views::Views;
+use crate::diagnose::{load, page};
+use crate::report::{FigureFormat, write_figures};
 
 /// Find what the simulation leaves out of recordings: where, which mechanism, how large, how sure.
 ///
@@ -30,6 +33,9 @@ pub(super) struct Arguments {
     /// Folder for the three files; made if it is not there.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
+    /// Also write the report's figures for a document, into DIR/figures.
+    #[arg(long, value_enum)]
+    format: Option<FigureFormat>,
     /// Print diagnosis.json and nothing else.
     #[arg(long)]
     json: bool,
@@ -54,26 +60,20 @@ pub(super) fn run(arguments: &Arguments, terminal: &mut Terminal) -> Result<(), 
             ablation.without(*part)
         })
         .unwrap_or_default();
-    let bar = Mutex::new(Progress::new("read", STEPS as u64));
-    let tell = |what: &str, steps: f64| {
-        let mut bar = bar.lock().unwrap_or_else(PoisonError::into_inner);
-        bar.says(what);
-        bar.done(steps as u64);
-    };
-    let campaign = load::campaign(&arguments.rig, &arguments.recordings, &|share| {
-        tell("read", READING * share);
-    })?;
     let out = &arguments.out;
     job::prepare_folder(out)?;
-    let diagnosis = job::run(campaign, ablation, &|share, what| {
-        tell(what, READING + (STEPS - READING) * share);
-    });
-    let text = job::write(out, &diagnosis, &command(arguments))?;
-    drop(bar);
+    let (diagnosis, views) = diagnosed(&arguments.rig, &arguments.recordings, ablation)?;
+    let text = job::write(out, &diagnosis, &views, &command(arguments))?;
+    if let Some(format) = arguments.format {
+        let report = page::report(&diagnosis, &views, "");
+        let figures = report.figures();
+        let figures = figures.iter().map(|(name, figure)| (name.clone(), figure));
+        write_figures(&out.join("figures"), figures, format)?;
+    }
     if arguments.json {
         return terminal.bytes(text.as_bytes());
     }
-    let summary = summary(&diagnosis, out);
+    let summary = summary(&diagnosis, out, terminal.width(WIDEST_LINE));
     for line in &summary.verdict {
         terminal.verdict(line, summary.good)?;
     }
@@ -81,6 +81,26 @@ pub(super) fn run(arguments: &Arguments, terminal: &mut Terminal) -> Result<(), 
         terminal.line(line)?;
     }
     Ok(())
+}
+
+/// Reads and diagnoses a campaign under a bar; the demo does too.
+pub(super) fn diagnosed(
+    rig: &Path,
+    recordings: &[PathBuf],
+    ablation: Ablation,
+) -> Result<(Diagnosis, Views), Failure> {
+    let bar = Mutex::new(Progress::new("read", STEPS as u64));
+    let tell = |what: &str, steps: f64| {
+        let mut bar = bar.lock().unwrap_or_else(PoisonError::into_inner);
+        bar.says(what);
+        bar.done(steps as u64);
+    };
+    let campaign = load::campaign(rig, recordings, &|share| {
+        tell("read", READING * share);
+    })?;
+    Ok(job::run(campaign, ablation, &|share, what| {
+        tell(what, READING + (STEPS - READING) * share);
+    }))
 }
 
 /// A part of the argument by its word, refused where the engine cannot do without it.

@@ -16,7 +16,7 @@ use crate::estimate::{
 };
 use crate::output::{OutputError, OutputFile, write_file};
 use crate::recording::Recording;
-use crate::report::{CurveLabel, of_estimate};
+use crate::report::{CurveLabel, FigureFormat, of_estimate, write_figures};
 use crate::rig_file::RigFile;
 use crate::wording::{consistency_sentence, estimate_sentence, model_sentences, noise_sentence};
 
@@ -38,14 +38,8 @@ pub(super) struct Arguments {
     /// Rig file (TOML).
     #[arg(long, value_name = "RIG.toml")]
     rig: PathBuf,
-    /// Where the filter starts: peak friction 0.6 (aircraft) or 1.0 (automotive), each give or take
-    /// itself.
-    #[arg(long, value_enum, default_value_t = RangeChoice::Aircraft)]
-    range: RangeChoice,
-    /// Which filter estimates; efficient unless a model with a low-pass filter on the force is
-    /// compensated.
-    #[arg(long, value_enum)]
-    estimator: Option<EstimatorChoice>,
+    #[command(flatten)]
+    choices: Choices,
     /// Compensate what a diagnosis found, sample by sample: `model.toml` as `diagnose` writes it. Effects
     /// that can be compensated are radius, delay, lag, zero drift, crosstalk, load and speed
     /// sensitivity, relaxation and tread temperature; others are named and left.
@@ -58,12 +52,50 @@ pub(super) struct Arguments {
     /// Write a report with plots.
     #[arg(long, value_name = "OUT.html")]
     report: Option<PathBuf>,
+    /// Also write the report's figures for a document, into the folder OUT-figures beside it.
+    #[arg(long, value_enum, requires = "report")]
+    format: Option<FigureFormat>,
     /// Print one JSON object and nothing else.
     #[arg(long)]
     json: bool,
     /// The recording (CSV).
     #[arg(value_name = "RUN.csv")]
     recording: PathBuf,
+}
+
+/// How to estimate; the campaign has the same.
+#[derive(Debug, Args)]
+pub(super) struct Choices {
+    /// Where the filter starts: peak friction 0.6 (aircraft) or 1.0 (automotive), each give or take
+    /// itself.
+    #[arg(long, value_enum, default_value_t = RangeChoice::Aircraft)]
+    range: RangeChoice,
+    /// Which filter estimates; efficient unless a model with a low-pass filter on the force is
+    /// compensated.
+    #[arg(long, value_enum)]
+    estimator: Option<EstimatorChoice>,
+}
+
+impl Choices {
+    pub(super) fn options(&self) -> EstimateOptions {
+        EstimateOptions {
+            estimator: self.estimator.map(|choice| match choice {
+                EstimatorChoice::Article => EstimatorKind::Article,
+                EstimatorChoice::Efficient => EstimatorKind::Efficient,
+            }),
+            range: self.range.into(),
+        }
+    }
+
+    /// The choices as arguments.
+    pub(super) fn words(&self) -> String {
+        let options = self.options();
+        let range = crate::estimate::range_word(options.range);
+        match options.estimator {
+            Some(estimator) => format!("--range {range} --estimator {}", estimator.word()),
+            None => format!("--range {range}"),
+        }
+    }
 }
 
 /// `--range`.
@@ -92,10 +124,6 @@ enum EstimatorChoice {
 }
 
 pub(super) fn run(arguments: &Arguments, terminal: &mut Terminal) -> Result<(), Failure> {
-    let estimator = arguments.estimator.map(|choice| match choice {
-        EstimatorChoice::Article => EstimatorKind::Article,
-        EstimatorChoice::Efficient => EstimatorKind::Efficient,
-    });
     let trace_is_printed = arguments.trace.as_deref() == Some(Path::new(PRINTED));
     if trace_is_printed && arguments.json {
         return Err(Failure::Usage(
@@ -105,13 +133,11 @@ pub(super) fn run(arguments: &Arguments, terminal: &mut Terminal) -> Result<(), 
     let job = Job {
         rig_path: &arguments.rig,
         recording_path: &arguments.recording,
-        options: EstimateOptions {
-            estimator,
-            range: arguments.range.into(),
-        },
+        options: arguments.choices.options(),
         model_path: arguments.model.as_deref(),
         trace: arguments.trace.as_deref(),
         report: arguments.report.as_deref(),
+        format: arguments.format,
         beside: None,
     };
     let result = job.run()?;
@@ -142,11 +168,22 @@ pub(super) struct Job<'a> {
     pub(super) model_path: Option<&'a Path>,
     pub(super) trace: Option<&'a Path>,
     pub(super) report: Option<&'a Path>,
+    pub(super) format: Option<FigureFormat>,
     pub(super) beside: Option<CurveLabel>,
 }
 
 impl Job<'_> {
     pub(super) fn run(&self) -> Result<EstimateResult, Failure> {
+        let bytes = 2 * Recording::open(self.recording_path)?.length_bytes();
+        let mut progress = Progress::bytes("estimate", bytes);
+        self.run_reporting(&mut |bytes| progress.done(bytes))
+    }
+
+    /// As [`Job::run`]; `progress` is told the bytes gone through, of twice the recording's length.
+    pub(super) fn run_reporting(
+        &self,
+        progress: &mut dyn FnMut(u64),
+    ) -> Result<EstimateResult, Failure> {
         let rig = RigFile::read(self.rig_path)?;
         let model = match self.model_path {
             Some(path) => {
@@ -157,8 +194,6 @@ impl Job<'_> {
             None => None,
         };
         let mut recording = Recording::open(self.recording_path)?;
-        let mut progress = Progress::new("estimate", 2 * recording.length_bytes());
-        let mut report_bytes = |bytes| progress.done(bytes);
         // Outputs are begun before the work, so that a folder that is not there is told at once.
         let report = self.report.map(OutputFile::create).transpose()?;
         drop(report);
@@ -175,7 +210,7 @@ impl Job<'_> {
             self.options,
             model.as_ref(),
             trace.as_mut(),
-            &mut report_bytes,
+            progress,
         )
         .map_err(|error| self.failure(error))?;
         if let (Some(trace), Some(path)) = (trace, self.trace) {
@@ -190,6 +225,11 @@ impl Job<'_> {
                 &self.command(&result),
             );
             write_file(path, page.to_html()?.as_bytes())?;
+            if let Some(format) = self.format {
+                let figures = page.figures();
+                let figures = figures.iter().map(|(name, figure)| (name.clone(), figure));
+                write_figures(&figures_folder(path), figures, format)?;
+            }
         }
         Ok(result)
     }
@@ -218,6 +258,13 @@ impl Job<'_> {
             self.recording_path.display()
         )
     }
+}
+
+/// The folder of a report's figures: `run.html` has `run-figures`.
+fn figures_folder(report: &Path) -> PathBuf {
+    let mut name = report.file_stem().unwrap_or_default().to_owned();
+    name.push("-figures");
+    report.with_file_name(name)
 }
 
 /// Where a trace goes.

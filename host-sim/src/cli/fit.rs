@@ -42,7 +42,7 @@ pub(super) fn run(arguments: &Arguments, terminal: &mut Terminal) -> Result<(), 
         recordings.push(Recording::open(path)?);
     }
     let bytes: u64 = recordings.iter().map(Recording::length_bytes).sum();
-    let mut progress = Progress::new("fit", 2 * bytes);
+    let mut progress = Progress::bytes("fit", 2 * bytes);
     let result = fit_recordings(
         &mut recordings,
         &rig,

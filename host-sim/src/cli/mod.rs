@@ -3,6 +3,7 @@
 //! One file a subcommand. Exit status: 0 done; 2 bad usage or bad input, with exactly one line on
 //! standard error. Whoever reads standard output may stop at any time: that ends the command quietly.
 
+mod campaign;
 mod completions;
 mod demo;
 mod diagnose;
@@ -26,7 +27,7 @@ use crate::estimate::EstimateError;
 use crate::fit::FitJobError;
 use crate::input_error::{InputError, one_line};
 use crate::output::OutputError;
-use crate::report::ReportError;
+use crate::report::{ExportError, ReportError};
 use terminal::Terminal;
 
 /// Exit status of bad usage and bad input.
@@ -45,6 +46,7 @@ struct Arguments {
 #[derive(Debug, Subcommand)]
 enum Command {
     Estimate(estimate::Arguments),
+    Campaign(campaign::Arguments),
     Fit(fit::Arguments),
     Diagnose(diagnose::Arguments),
     Predict(predict::Arguments),
@@ -95,6 +97,15 @@ impl From<ReportError> for Failure {
     }
 }
 
+impl From<ExportError> for Failure {
+    fn from(error: ExportError) -> Self {
+        match error {
+            ExportError::Output(error) => Self::Output(error),
+            ExportError::Report(error) => error.into(),
+        }
+    }
+}
+
 /// Runs the command with the arguments of the process.
 pub fn main() -> ExitCode {
     let arguments = match Arguments::try_parse() {
@@ -104,6 +115,7 @@ pub fn main() -> ExitCode {
     let mut terminal = Terminal::new();
     let outcome = match arguments.command {
         Command::Estimate(arguments) => estimate::run(&arguments, &mut terminal),
+        Command::Campaign(arguments) => campaign::run(&arguments, &mut terminal),
         Command::Fit(arguments) => fit::run(&arguments, &mut terminal),
         Command::Diagnose(arguments) => diagnose::run(&arguments, &mut terminal),
         Command::Predict(arguments) => predict::run(&arguments, &mut terminal),

@@ -13,7 +13,7 @@ use crate::paper::{
     CONVERGENCE_PAGE, Paper, PaperOptions, Table, article_markdown, convergence_page, figures,
     report_page, reproduce, work,
 };
-use crate::report::svg::stand_alone;
+use crate::report::{FigureFormat, write_figures};
 
 /// Reproduce the article that the filter comes from: its statements, its figures, its errors.
 ///
@@ -26,7 +26,7 @@ muslip paper\n  \
 muslip paper --seeds 1000 --seed 7 --out quick\n  \
 muslip paper --json > article.json")]
 pub(super) struct Arguments {
-    /// Folder for the report, the animation, the figures (SVG) and the tables (Markdown).
+    /// Folder for the report, the animation, the figures and the tables (Markdown).
     #[arg(long, value_name = "FOLDER", default_value = "muslip-paper")]
     out: PathBuf,
     /// Streams of noise.
@@ -36,6 +36,9 @@ pub(super) struct Arguments {
     /// Seed of the first stream, which the figures show; the others follow it one by one.
     #[arg(long, value_name = "SEED", default_value_t = PaperOptions::default().seed)]
     seed: u64,
+    /// How the figures are written, for a document.
+    #[arg(long, value_enum, default_value_t = FigureFormat::Svg)]
+    format: FigureFormat,
     /// Print one JSON object and nothing else; files are written all the same.
     #[arg(long)]
     json: bool,
@@ -53,7 +56,7 @@ pub(super) fn run(arguments: &Arguments, terminal: &mut Terminal) -> Result<(), 
     let paper = reproduce(options, &mut |done| progress.done(done));
     drop(progress);
     let seconds = started.elapsed().as_secs_f64();
-    let written = write_all(&paper, &arguments.out)?;
+    let written = write_all(&paper, &arguments.out, arguments.format)?;
     if arguments.json {
         return terminal.json(&paper.to_json());
     }
@@ -66,17 +69,14 @@ pub(super) fn run(arguments: &Arguments, terminal: &mut Terminal) -> Result<(), 
 }
 
 /// Writes every file; returns those to name.
-fn write_all(paper: &Paper, folder: &Path) -> Result<Vec<PathBuf>, Failure> {
+fn write_all(paper: &Paper, folder: &Path, format: FigureFormat) -> Result<Vec<PathBuf>, Failure> {
     let refused = |error| Failure::Internal(format!("the figures cannot be drawn: {error}"));
     let drawings = folder.join("figures");
-    create_folder(&drawings)?;
-    for figure in figures(paper.options.seed).map_err(refused)? {
-        let svg = stand_alone(&figure.figure).map_err(crate::report::ReportError::from)?;
-        write_file(
-            &drawings.join(format!("{}.svg", figure.name)),
-            svg.as_bytes(),
-        )?;
-    }
+    let named = figures(paper.options.seed).map_err(refused)?;
+    let named = named
+        .iter()
+        .map(|named| (named.name.clone(), &named.figure));
+    write_figures(&drawings, named, format)?;
     let [report, convergence, tables] =
         ["report.html", CONVERGENCE_PAGE, "article.md"].map(|name| folder.join(name));
     let page = report_page(paper).map_err(refused)?;

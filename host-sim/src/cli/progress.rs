@@ -2,7 +2,7 @@
 
 use std::time::{Duration, Instant};
 
-use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
 
 use super::terminal::shows_progress;
 
@@ -20,10 +20,25 @@ pub(super) struct Progress {
 impl Progress {
     /// A bar for `total` units of work under a name.
     pub(super) fn new(name: &'static str, total: u64) -> Self {
+        Self::with_rate(name, total, "{percent_per_sec}")
+    }
+
+    /// A bar for as many bytes.
+    pub(super) fn bytes(name: &'static str, total: u64) -> Self {
+        Self::with_rate(name, total, "{binary_bytes_per_sec}")
+    }
+
+    fn with_rate(name: &'static str, total: u64, rate: &str) -> Self {
         let bar = ProgressBar::with_draw_target(Some(total), ProgressDrawTarget::hidden());
-        if let Ok(style) = ProgressStyle::with_template("{msg} {bar:32} {percent:>3} %  {eta} left")
-        {
-            bar.set_style(style);
+        // The bar gives way on a narrow terminal, the figures do not.
+        let template = format!("{{msg}} {{wide_bar}} {{percent:>3}} % {rate}, {{eta}} left");
+        if let Ok(style) = ProgressStyle::with_template(&template) {
+            let percent_a_second = move |state: &ProgressState, out: &mut dyn std::fmt::Write| {
+                let rate = 100.0 * state.per_sec() / total.max(1) as f64;
+                // A rate that cannot be written is only not seen.
+                let _ = write!(out, "{rate:.1} %/s");
+            };
+            bar.set_style(style.with_key("percent_per_sec", percent_a_second));
         }
         bar.set_message(name);
         Self {

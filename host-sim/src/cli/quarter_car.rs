@@ -13,7 +13,7 @@ use crate::paper::Table;
 use crate::quarter_car::{
     SetupError, Study, StudyOptions, figures, markdown, report_page, study, work,
 };
-use crate::report::svg::stand_alone;
+use crate::report::{FigureFormat, write_figures};
 
 /// Brake a simulated quarter car on estimates from wheel speed: figures, comparison, Monte Carlo.
 ///
@@ -26,7 +26,7 @@ muslip quarter-car\n  \
 muslip quarter-car --stops 2 --draws 2 --out quick\n  \
 muslip quarter-car --json > quarter-car.json")]
 pub(super) struct Arguments {
-    /// Folder for the report, the figures (SVG) and the tables (Markdown).
+    /// Folder for the report, the figures and the tables (Markdown).
     #[arg(long, value_name = "FOLDER", default_value = "muslip-quarter-car")]
     out: PathBuf,
     /// Stops of each row of the comparison, which differ in their noise.
@@ -40,6 +40,9 @@ pub(super) struct Arguments {
     /// Seed of the first stop, which the figures show; the others follow it one by one.
     #[arg(long, value_name = "SEED", default_value_t = StudyOptions::default().seed)]
     seed: u64,
+    /// How the figures are written, for a document.
+    #[arg(long, value_enum, default_value_t = FigureFormat::Svg)]
+    format: FigureFormat,
     /// Print one JSON object and nothing else; files are written all the same.
     #[arg(long)]
     json: bool,
@@ -64,7 +67,7 @@ pub(super) fn run(arguments: &Arguments, terminal: &mut Terminal) -> Result<(), 
     let study = study(options, &mut |done| progress.done(done))?;
     drop(progress);
     let seconds = started.elapsed().as_secs_f64();
-    let written = write_all(&study, &arguments.out)?;
+    let written = write_all(&study, &arguments.out, arguments.format)?;
     if arguments.json {
         return terminal.json(&study.to_json());
     }
@@ -77,16 +80,13 @@ pub(super) fn run(arguments: &Arguments, terminal: &mut Terminal) -> Result<(), 
 }
 
 /// Writes every file; returns those to name.
-fn write_all(study: &Study, folder: &Path) -> Result<Vec<PathBuf>, Failure> {
+fn write_all(study: &Study, folder: &Path, format: FigureFormat) -> Result<Vec<PathBuf>, Failure> {
     let drawings = folder.join("figures");
-    create_folder(&drawings)?;
-    for named in figures(study.options.seed)? {
-        let svg = stand_alone(&named.figure).map_err(crate::report::ReportError::from)?;
-        write_file(
-            &drawings.join(format!("{}.svg", named.name)),
-            svg.as_bytes(),
-        )?;
-    }
+    let named = figures(study.options.seed)?;
+    let named = named
+        .iter()
+        .map(|named| (named.name.to_owned(), &named.figure));
+    write_figures(&drawings, named, format)?;
     let [report, tables] = ["report.html", "quarter-car.md"].map(|name| folder.join(name));
     write_file(&report, report_page(study)?.to_html()?.as_bytes())?;
     write_file(&tables, markdown(study)?.as_bytes())?;

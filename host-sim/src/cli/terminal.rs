@@ -8,17 +8,28 @@ use super::Failure;
 
 /// Widest line of running text.
 const WIDEST_LINE: usize = 84;
+/// Narrowest terminal that lines are broken for.
+const NARROWEST: usize = 40;
 
 /// Standard output. Colours and bold only where it is a terminal and `NO_COLOR` does not forbid them.
 pub(super) struct Terminal {
     out: anstream::AutoStream<io::Stdout>,
+    /// Columns of the terminal; `None` in a pipe or a file.
+    columns: Option<usize>,
 }
 
 impl Terminal {
     pub(super) fn new() -> Self {
         Self {
             out: anstream::AutoStream::auto(io::stdout()),
+            columns: terminal_size::terminal_size_of(io::stdout())
+                .map(|(columns, _)| usize::from(columns.0).max(NARROWEST)),
         }
+    }
+
+    /// The widest line, where at most `widest` is wanted.
+    pub(super) fn width(&self, widest: usize) -> usize {
+        self.columns.map_or(widest, |columns| columns.min(widest))
     }
 
     /// Prints a line as it is.
@@ -45,7 +56,7 @@ impl Terminal {
 
     /// Prints running text, wrapped.
     pub(super) fn paragraph(&mut self, text: &str) -> Result<(), Failure> {
-        for line in wrapped(text, WIDEST_LINE) {
+        for line in wrapped(text, self.width(WIDEST_LINE)) {
             self.line(&line)?;
         }
         Ok(())
@@ -54,8 +65,19 @@ impl Terminal {
     /// Prints names and values in two columns.
     pub(super) fn table(&mut self, rows: &[(&str, String)]) -> Result<(), Failure> {
         let widest = rows.iter().map(|(name, _)| name.len()).max().unwrap_or(0);
+        // In a pipe a row is a line.
+        let room = self
+            .columns
+            .map(|columns| columns.saturating_sub(widest + 4));
         for (name, value) in rows {
-            self.line(&format!("  {name:widest$}  {value}"))?;
+            let lines = match room {
+                Some(room) if value.chars().count() > room => wrapped(value, room),
+                _ => vec![value.clone()],
+            };
+            let names = std::iter::once(*name).chain(std::iter::repeat(""));
+            for (name, line) in names.zip(lines) {
+                self.line(&format!("  {name:widest$}  {line}"))?;
+            }
         }
         Ok(())
     }

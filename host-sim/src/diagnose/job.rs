@@ -8,6 +8,7 @@ use muslip_diagnose::diagnose::diagnose_without;
 use muslip_diagnose::outcome::{Diagnosis, Fault};
 
 use super::load::Campaign;
+use super::views::{Kept, Views};
 use super::wording::verdict_sentence;
 use super::{json, model_file, page};
 use crate::output::{OutputError, OutputFile, create_folder};
@@ -30,18 +31,20 @@ pub enum WriteError {
     Text(String),
 }
 
-/// Runs the engine on a campaign. What had to be mended to read them joins the faults of the data.
+/// Runs the engine on a campaign, which is given up to it but for what the report shows. What had to be mended to read them joins the faults of the data.
 #[must_use]
 pub fn run(
     campaign: Campaign,
     ablation: Ablation,
     progress: &(dyn Fn(f64, &str) + Sync),
-) -> Diagnosis {
+) -> (Diagnosis, Views) {
     let Campaign { rig, runs, faults } = campaign;
+    let kept = Kept::of(&runs);
     let mut diagnosis = diagnose_without(&rig, runs, ablation, progress);
+    let views = Views::of(&diagnosis, &kept);
     add_faults(&mut diagnosis, faults);
     json::make_finite(&mut diagnosis);
-    diagnosis
+    (diagnosis, views)
 }
 
 /// Faults of reading stand before those of content.
@@ -68,11 +71,16 @@ pub fn prepare_folder(out: &Path) -> Result<(), OutputError> {
 ///
 /// # Errors
 /// [`WriteError`]; files that were there before are then still what they were.
-pub fn write(out: &Path, diagnosis: &Diagnosis, command: &str) -> Result<String, WriteError> {
+pub fn write(
+    out: &Path,
+    diagnosis: &Diagnosis,
+    views: &Views,
+    command: &str,
+) -> Result<String, WriteError> {
     let text = json::to_text(diagnosis).map_err(|error| WriteError::Text(error.to_string()))?;
     let model = model_file::to_text(&diagnosis.repaired, &verdict_sentence(diagnosis))
         .map_err(|error| WriteError::Text(error.to_string()))?;
-    let report = page::report(diagnosis, command).to_html()?;
+    let report = page::report(diagnosis, views, command).to_html()?;
     create_folder(out)?;
     let mut files = Vec::with_capacity(FILES.len());
     for (name, contents) in FILES.into_iter().zip([&text, &model, &report]) {

@@ -8,5 +8,7 @@ pub mod optional;
 pub mod page;
 pub mod plots;
 pub mod predict;
+mod proof;
 pub mod summary;
+pub mod views;
 pub mod wording;

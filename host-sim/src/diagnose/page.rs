@@ -1,15 +1,15 @@
 //! The report of a diagnosis: `report.html`.
 
 use muslip_diagnose::mechanism::Id;
-use muslip_diagnose::outcome::{
-    Diagnosis, Estimate, Interval, NamedMechanism, Role, Score, Verdict,
-};
+use muslip_diagnose::outcome::{Diagnosis, Interval, NamedMechanism, Role, Verdict};
 
 use super::plots;
+use super::proof::proof;
+use super::views::Views;
 use super::wording::{
-    NO_BREAK, capitalised, confusable_sentence, estimate, least, mechanism_sentence, percent,
-    quantity, quantity_apart, range, short_name, sigmas, significant, spoken, stretch,
-    unexplained_sentence, unseen, variable, verdict_sentence, with_unit,
+    NO_BREAK, capitalised, confusable_sentence, least, mechanism_sentence, percent, quantity,
+    quantity_apart, range, short_name, sigmas, significant, spoken, stretch, unexplained_sentence,
+    unseen, variable, verdict_sentence, with_unit,
 };
 use crate::report::{Block, KeyFigure, Report, Section, Table, Tone};
 
@@ -18,12 +18,12 @@ const MOST_ROWS: usize = 24;
 
 /// The report of a diagnosis. `command` is what made it.
 #[must_use]
-pub fn report(diagnosis: &Diagnosis, command: &str) -> Report {
+pub fn report(diagnosis: &Diagnosis, views: &Views, command: &str) -> Report {
     let sections = [
-        findings(diagnosis),
+        findings(diagnosis, views),
         comparison(diagnosis),
         proof(diagnosis),
-        places(diagnosis),
+        places(diagnosis, views),
         looked_for(diagnosis),
         data(diagnosis),
     ];
@@ -116,22 +116,23 @@ fn key_figures(diagnosis: &Diagnosis) -> Vec<KeyFigure> {
     figures
 }
 
-fn section(heading: &str, blocks: Vec<Block>) -> Section {
+pub(super) fn section(heading: &str, blocks: Vec<Block>) -> Section {
     Section {
         heading: heading.into(),
         blocks,
     }
 }
 
-fn table<const N: usize>(head: [&str; N], rows: Vec<[String; N]>) -> Block {
+pub(super) fn table<const N: usize>(head: [&str; N], rows: Vec<[String; N]>) -> Block {
     Block::Table(Table::new(head, rows))
 }
 
-fn findings(diagnosis: &Diagnosis) -> Section {
+fn findings(diagnosis: &Diagnosis, views: &Views) -> Section {
     let mut blocks = Vec::new();
     for mechanism in &diagnosis.mechanisms {
         blocks.push(Block::Paragraph(mechanism_sentence(mechanism)));
         blocks.push(mechanism_table(mechanism));
+        blocks.extend(views.effect(mechanism.id).map(Block::Figure));
     }
     for rest in &diagnosis.unexplained {
         blocks.push(Block::Paragraph(unexplained_sentence(rest)));
@@ -206,15 +207,21 @@ fn comparison(diagnosis: &Diagnosis) -> Section {
     }
     let left_out = diagnosis.traces.len().saturating_sub(traces.len());
     if left_out > 0 {
+        let recordings = match left_out {
+            1 => "1 more recording is".to_owned(),
+            many => format!("{many} more recordings are"),
+        };
         blocks.push(Block::Paragraph(format!(
-            "{left_out} more recordings are not drawn against time."
+            "{recordings} not drawn against time."
         )));
     }
     section("Before and after", blocks)
 }
 
-fn places(diagnosis: &Diagnosis) -> Section {
-    let mut blocks = Vec::new();
+fn places(diagnosis: &Diagnosis, views: &Views) -> Section {
+    let maps = views.over_slip_and_speed(diagnosis).into_iter();
+    let maps = maps.chain(Views::over_time(diagnosis));
+    let mut blocks: Vec<Block> = maps.map(Block::Figure).collect();
     if !diagnosis.regions.is_empty() {
         let rows = diagnosis
             .regions
@@ -274,104 +281,6 @@ fn strongest(intervals: &[Interval]) -> Vec<&Interval> {
     order.truncate(MOST_ROWS);
     order.sort_unstable();
     order.into_iter().map(|index| &intervals[index]).collect()
-}
-
-fn proof(diagnosis: &Diagnosis) -> Section {
-    let fit = &diagnosis.fit;
-    let scores = [
-        ("fitted data, base law", &fit.fit.before),
-        ("fitted data, repaired model", &fit.fit.after),
-        ("held-out data, base law", &fit.holdout.before),
-        ("held-out data, repaired model", &fit.holdout.after),
-    ];
-    let rows: Vec<_> = scores
-        .into_iter()
-        .filter(|(_, score)| **score != Score::default())
-        .map(|(name, score)| {
-            [
-                name.to_owned(),
-                format!("{} N", significant(score.rmse_n, 4)),
-                significant(score.nll_per_sample, 4),
-                score
-                    .whiteness_p
-                    .map_or_else(|| "not tested".to_owned(), probability),
-            ]
-        })
-        .collect();
-    let mut blocks = Vec::new();
-    if !rows.is_empty() {
-        blocks.push(table(
-            [
-                "drag predicted on",
-                "RMSE",
-                "negative log likelihood a sample",
-                "whiteness p",
-            ],
-            rows,
-        ));
-        let proof = if diagnosis.recordings.iter().any(|r| r.role == Role::Holdout) {
-            "Held-out recordings were seen by no parameter and no choice of mechanism."
-        } else {
-            "Held-out blocks of the recording were seen by no parameter and no choice of mechanism."
-        };
-        let whiteness = "Whiteness p: how likely chance alone leaves as much structure in the errors; a small \
-                         value means that something is left.";
-        blocks.push(Block::Paragraph(
-            if fit.holdout.before == Score::default() {
-                whiteness.to_owned()
-            } else {
-                format!("{proof} {whiteness}")
-            },
-        ));
-    }
-    let mut rows: Vec<[String; 3]> = base_in_order(diagnosis)
-        .map(|(name, value)| {
-            let (name, of) = match name.strip_prefix("repaired_") {
-                Some(name) => (name, "1-sigma, law beside the mechanisms"),
-                None => (name, "1-sigma, law alone"),
-            };
-            [spoken(name), estimate(value), of.to_owned()]
-        })
-        .collect();
-    rows.extend(diagnosis.noise.iter().map(|(channel, noise)| {
-        let declared = match noise.declared {
-            Some(declared) => format!("declared {}", significant(declared, 3)),
-            None => "none declared".to_owned(),
-        };
-        [
-            format!("noise of {channel}"),
-            significant(noise.sigma, 3),
-            declared,
-        ]
-    }));
-    if !rows.is_empty() {
-        blocks.push(table(["base law and noise", "found", ""], rows));
-    }
-    section("How much better", blocks)
-}
-
-/// The law's parameters: alone before repaired, the peak before its slip.
-fn base_in_order(diagnosis: &Diagnosis) -> impl Iterator<Item = (&str, &Estimate)> {
-    let mut rows: Vec<(&str, &Estimate)> = diagnosis
-        .base
-        .iter()
-        .map(|(name, value)| (name.as_str(), value))
-        .collect();
-    rows.sort_by_key(|(name, _)| {
-        (
-            name.starts_with("repaired_"),
-            !name.ends_with("peak_friction"),
-        )
-    });
-    rows.into_iter()
-}
-
-fn probability(p: f64) -> String {
-    if p < 0.001 {
-        "<0.001".to_owned()
-    } else {
-        format!("{p:.3}")
-    }
 }
 
 fn looked_for(diagnosis: &Diagnosis) -> Section {

@@ -14,7 +14,7 @@ use super::wording::{
 
 /// Most lines of a summary.
 pub const MOST_LINES: usize = 25;
-/// Most characters of a line.
+/// Most characters of a line, where the terminal has as many columns.
 pub const WIDEST_LINE: usize = 100;
 
 /// Width of the labels at the left.
@@ -31,21 +31,24 @@ pub struct Summary {
     pub lines: Vec<String>,
 }
 
-/// Writes the summary of a diagnosis; `out` is the folder of its files.
+/// Writes the summary of a diagnosis in lines of at most `width` characters, which is at least 40; `out` is
+/// the folder of its files, whose own line is as long as it must be.
 #[must_use]
-pub fn summary(diagnosis: &Diagnosis, out: &Path) -> Summary {
-    let mut verdict = wrapped(&one_line(&verdict_sentence(diagnosis)), WIDEST_LINE);
-    cut(&mut verdict, 2, WIDEST_LINE);
+pub fn summary(diagnosis: &Diagnosis, out: &Path, width: usize) -> Summary {
+    let mut verdict = wrapped(&one_line(&verdict_sentence(diagnosis)), width);
+    // A narrow terminal needs more lines for the same words.
+    let verdict_lines = if width < WIDEST_LINE { 4 } else { 2 };
+    cut(&mut verdict, verdict_lines, width);
     // What is said of every campaign comes first among the caveats, and is least needed here.
     let notes = diagnosis.caveats.iter().rev().cloned().collect();
     let mut sections = [
-        Part::new("Where", 3, places(diagnosis)),
-        Part::new("What", 7, findings(diagnosis)),
-        Part::new("Better", 2, improvement(diagnosis)),
-        Part::new("Next", 2, next(diagnosis)),
-        Part::new("Data", 2, faults(diagnosis)),
-        Part::new("Unseen", 3, unnoticed(diagnosis)),
-        Part::new("Note", 2, notes),
+        Part::new("Where", 3, places(diagnosis), width),
+        Part::new("What", 9 - verdict.len().max(2), findings(diagnosis), width),
+        Part::new("Better", 2, improvement(diagnosis), width),
+        Part::new("Next", 2, next(diagnosis), width),
+        Part::new("Data", 2, faults(diagnosis), width),
+        Part::new("Unseen", 3, unnoticed(diagnosis), width),
+        Part::new("Note", 2, notes, width),
     ];
     // An empty line and the files' come on top.
     share_out(&mut sections, MOST_LINES - verdict.len() - 2);
@@ -73,23 +76,30 @@ struct Part {
     label: &'static str,
     body: Vec<String>,
     most: usize,
+    /// Characters of a line.
+    width: usize,
 }
 
 impl Part {
     /// `most`: lines that it has in any case, if it needs them.
-    fn new(label: &'static str, most: usize, texts: Vec<String>) -> Self {
+    fn new(label: &'static str, most: usize, texts: Vec<String>, width: usize) -> Self {
         let body: Vec<String> = texts
             .iter()
             // Headers and paths come from outside: nothing in them may steer the terminal.
-            .flat_map(|text| wrapped(&one_line(text), WIDEST_LINE - LABEL))
+            .flat_map(|text| wrapped(&one_line(text), width - LABEL))
             .collect();
         let most = most.min(body.len());
-        Self { label, body, most }
+        Self {
+            label,
+            body,
+            most,
+            width: width - LABEL,
+        }
     }
 
     fn lines(&self) -> Vec<String> {
         let mut lines = self.body.clone();
-        cut(&mut lines, self.most, WIDEST_LINE - LABEL);
+        cut(&mut lines, self.most, self.width);
         lines
     }
 }

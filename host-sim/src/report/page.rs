@@ -8,7 +8,7 @@ use sha2::{Digest as _, Sha256};
 
 use super::convergence::Convergence;
 use super::figure::{Figure, Shape};
-use super::spec::{alternative, ink_word, of_figure, shape_word};
+use super::spec::{alternative, ink_word, of_figure, shape_word, short};
 use super::svg::DrawError;
 use super::table::Table;
 
@@ -97,6 +97,9 @@ pub enum ReportError {
     /// A figure could not be drawn.
     #[error(transparent)]
     Draw(#[from] DrawError),
+    /// A figure could not be turned into pixels.
+    #[error("a figure could not be turned into pixels: {0}")]
+    Picture(String),
     /// The page could not be put together.
     #[error("the report could not be put together: {0}")]
     Page(#[from] askama::Error),
@@ -214,8 +217,8 @@ impl PageData {
             ramp: layers
                 .filter_map(|layer| match &layer.shape {
                     Shape::Cells(cells) => Some((
-                        format!("\u{2212}{:.3} {}", cells.limit, cells.unit),
-                        format!("+{:.3} {}", cells.limit, cells.unit),
+                        format!("\u{2212}{} {}", short(cells.limit), cells.unit),
+                        format!("+{} {}", short(cells.limit), cells.unit),
                     )),
                     _ => None,
                 })
@@ -456,7 +459,7 @@ mod tests {
         let (_, rest) = page
             .split_once("Content-Security-Policy\" content=\"")
             .unwrap();
-        let policy = rest.split('"').next().unwrap().replace("&#39;", "'");
+        let policy = rest.split('"').next().unwrap();
         for (open, close) in [("<style>", "</style>"), ("<script>", "</script>")] {
             for part in page.split(open).skip(1) {
                 let text = part.split(close).next().unwrap();

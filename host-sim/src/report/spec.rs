@@ -121,7 +121,7 @@ pub(super) fn alternative(figure: &Figure) -> String {
         .collect();
     let shown = match named.len() {
         0 => String::new(),
-        ..=MOST_NAMED => format!(" Shown: {}.", named.join("; ")),
+        1..=MOST_NAMED => format!(" Shown: {}.", named.join("; ")),
         many => format!(
             " Shown: {}; and {} more.",
             named[..MOST_NAMED].join("; "),
@@ -179,7 +179,8 @@ fn in_words(shape: &Shape) -> String {
     }
 }
 
-fn short(value: f64) -> String {
+/// A number with three digits.
+pub(super) fn short(value: f64) -> String {
     let digits = format!("{value:.2e}").parse::<f64>().unwrap_or(value);
     format!("{digits}").replace('-', "\u{2212}")
 }

@@ -8,9 +8,10 @@ use std::time::{Duration, Instant};
 use common::{HEADER, RIG, Scratch, recording_of};
 use test_support::scenario::article;
 
-const SUBCOMMANDS: [&str; 10] = [
+const SUBCOMMANDS: [&str; 11] = [
     "rig",
     "estimate",
+    "campaign",
     "fit",
     "diagnose",
     "predict",
@@ -325,6 +326,24 @@ fn a_report_of_a_hostile_name_holds_no_markup_of_it() {
     scratch.output(&["estimate", "--rig", "rig.toml", "--report", "r.html", name]);
     let page = scratch.read("r.html");
     assert!(!page.contains("<img") && page.contains("img src=x"));
+}
+
+#[test]
+fn the_same_figures_are_written_for_a_document() {
+    let scratch = scratch();
+    for (format, start) in [("svg", b"<svg xmlns".as_slice()), ("png", b"\x89PNG")] {
+        scratch.output(&[
+            "estimate", "--rig", "rig.toml", "--report", "r.html", "--format", format, "run.csv",
+        ]);
+        for name in ["curve", "ellipse", "figure-1-variances", "innovations"] {
+            let path = scratch.path(&format!("r-figures/{name}.{format}"));
+            assert!(std::fs::read(path).unwrap().starts_with(start), "{name}");
+        }
+    }
+    let complaint = scratch.complaint(&[
+        "estimate", "--rig", "rig.toml", "--format", "svg", "run.csv",
+    ]);
+    assert!(complaint.contains("--report"), "{complaint}");
 }
 
 #[test]

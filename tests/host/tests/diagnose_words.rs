@@ -7,11 +7,16 @@ use std::path::Path;
 use diagnosis::{assert_valid, consistent, monstrous, partly_explained};
 use host_sim::diagnose::model_file::ModelFile;
 use host_sim::diagnose::summary::{MOST_LINES, WIDEST_LINE, summary};
+use host_sim::diagnose::views::Views;
 use host_sim::diagnose::{job, json, model_file, page};
 use muslip_diagnose::outcome::{BeforeAfter, Diagnosis, Fit, LookedFor, Verdict};
 
 fn told(diagnosis: &Diagnosis) -> String {
-    let summary = summary(diagnosis, Path::new("found"));
+    told_within(diagnosis, WIDEST_LINE)
+}
+
+fn told_within(diagnosis: &Diagnosis, width: usize) -> String {
+    let summary = summary(diagnosis, Path::new("found"), width);
     let lines: Vec<String> = summary.verdict.into_iter().chain(summary.lines).collect();
     lines.join("\n") + "\n"
 }
@@ -52,11 +57,13 @@ fn a_summary_fits_its_lines_whatever_was_found() {
             if finite {
                 json::make_finite(&mut diagnosis);
             }
-            let text = told(&diagnosis);
-            assert!(text.lines().count() <= MOST_LINES, "{text}");
-            for line in text.lines() {
-                assert!(line.chars().count() <= WIDEST_LINE, "{line}");
-                assert!(!line.chars().any(char::is_control), "{line:?}");
+            for width in [60, 80, WIDEST_LINE] {
+                let text = told_within(&diagnosis, width);
+                assert!(text.lines().count() <= MOST_LINES, "{text}");
+                for line in text.lines() {
+                    assert!(line.chars().count() <= width, "{line}");
+                    assert!(!line.chars().any(char::is_control), "{line:?}");
+                }
             }
         }
     }
@@ -132,9 +139,13 @@ fn every_digit_of_a_number_survives_the_files() {
 
 #[test]
 fn the_report_shows_every_part_and_without_plots_runs_no_script() {
-    let page = page::report(&partly_explained(), "muslip diagnose <x>")
-        .to_html()
-        .unwrap();
+    let page = page::report(
+        &partly_explained(),
+        &Views::default(),
+        "muslip diagnose <x>",
+    )
+    .to_html()
+    .unwrap();
     for part in [
         "What is missing",
         "Before and after",
@@ -155,7 +166,7 @@ fn the_report_shows_every_part_and_without_plots_runs_no_script() {
     }
     for mut diagnosis in [consistent(), undecided(), monstrous()] {
         json::make_finite(&mut diagnosis);
-        let page = page::report(&diagnosis, "muslip diagnose")
+        let page = page::report(&diagnosis, &Views::default(), "muslip diagnose")
             .to_html()
             .unwrap();
         assert!(!page.contains("<script") && !page.contains("NaN"));
@@ -163,10 +174,34 @@ fn the_report_shows_every_part_and_without_plots_runs_no_script() {
 }
 
 #[test]
+fn a_column_named_like_markup_is_text_in_the_report() {
+    let named = "<script>alert(1)</script>";
+    let mut diagnosis = partly_explained();
+    let usual = page::report(&diagnosis, &Views::default(), "muslip")
+        .to_html()
+        .unwrap();
+    diagnosis.unexplained[0].variable = named.to_owned();
+    diagnosis.data_faults[0].channel = named.to_owned();
+    diagnosis.regions[0].variable = named.to_owned();
+    diagnosis.recordings[0].path = named.to_owned();
+    let page = page::report(&diagnosis, &Views::default(), "muslip")
+        .to_html()
+        .unwrap();
+    assert_eq!(
+        page.matches("<script").count(),
+        usual.matches("<script").count()
+    );
+    assert!(
+        page.matches("&#60;script&#62;alert(1)").count() >= 4,
+        "{page}"
+    );
+}
+
+#[test]
 fn a_failure_to_write_leaves_what_was_there() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("found");
-    job::write(&out, &consistent(), "first").unwrap();
+    job::write(&out, &consistent(), &Views::default(), "first").unwrap();
     let before = read_all(&out);
     assert_eq!(
         before
@@ -178,7 +213,7 @@ fn a_failure_to_write_leaves_what_was_there() {
     // The last of the three cannot be made: a folder has its name.
     std::fs::remove_file(out.join("report.html")).unwrap();
     std::fs::create_dir(out.join("report.html")).unwrap();
-    let error = job::write(&out, &partly_explained(), "second").unwrap_err();
+    let error = job::write(&out, &partly_explained(), &Views::default(), "second").unwrap_err();
     assert!(
         error
             .to_string()
