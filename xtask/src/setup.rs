@@ -200,7 +200,7 @@ mod tests {
     const ROOT: (&str, &str) = ("id", "echo 0");
     const INSTALLS: (&str, &str) = (
         "apt-get",
-        "[ \"$1\" = install ] && : > \"$here/qemu-system-arm\"; exit 0",
+        "[ \"$1\" = install ] && : > \"$here/qemu-system-arm\" && : > \"$here/chromium\"; exit 0",
     );
 
     #[test]
@@ -214,6 +214,7 @@ mod tests {
         let list = format!("echo '{}'", TARGETS.join("\n"));
         let there = [
             ("qemu-system-arm", ""),
+            ("chromium", ""),
             ("rustup", list.as_str()),
             ROOT,
             INSTALLS,
@@ -224,7 +225,7 @@ mod tests {
     }
 
     #[test]
-    fn a_bare_machine_gets_the_missing_targets_and_the_package() {
+    fn a_bare_machine_gets_the_missing_targets_and_packages() {
         let bare = Bare::new(&[("rustup", "echo thumbv6m-none-eabi"), ROOT, INSTALLS]);
         bare.machine.set_up(TOOLS).unwrap();
         assert_eq!(
@@ -233,7 +234,7 @@ mod tests {
              rustup target add thumbv7em-none-eabihf wasm32-unknown-unknown\n\
              id -u\n\
              apt-get update -q\n\
-             apt-get install -q -y --no-install-recommends qemu-system-arm\n"
+             apt-get install -q -y --no-install-recommends qemu-system-arm chromium\n"
         );
     }
 
@@ -243,7 +244,7 @@ mod tests {
             let bare = Bare::new(programs);
             let told = bare.machine.tools(TOOLS).unwrap_err().to_string();
             assert!(
-                told.ends_with("install with: sudo apt-get install qemu-system-arm"),
+                told.ends_with("install with: sudo apt-get install qemu-system-arm chromium"),
                 "{told}"
             );
             assert!(!bare.log().contains("apt-get"));
