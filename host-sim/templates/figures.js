@@ -117,7 +117,9 @@ muslip.Figure = (() => {
   const number = (value, decimals) => value.toFixed(decimals).replace("-", "\u2212");
   const linearLabels = (u, splits) => {
     const step = splits.length > 1 ? Math.abs(splits[1] - splits[0]) : 1;
-    const decimals = Math.min(9, Math.max(0, Math.ceil(-Math.log10(step) - 1e-9)));
+    // As many as the step itself has: 0.25 has two.
+    let decimals = 0;
+    while (decimals < 9 && Math.abs(step * 10 ** decimals - Math.round(step * 10 ** decimals)) > 1e-6 * step * 10 ** decimals) decimals += 1;
     return splits.map((value) => (Math.abs(value) >= 1e6 ? value.toExponential() : number(value, decimals)));
   };
   const logSplits = (u, axis, min, max) => {

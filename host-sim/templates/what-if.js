@@ -87,7 +87,7 @@ muslip.whatIf = (() => {
       && (assumed.efficient || assumed.pseudonoise);
     const table = muslip.table(
       untouched ? "As the command ran it" : "Under these assumptions",
-      ["", "peak friction", "critical slip", "mean NIS", "verdict", "measurements used"],
+      ["run by", "peak friction", "critical slip", "mean NIS", "verdict", "measurements used"],
       [describe("the command", host, data.used), describe("this page", result, result.used)],
     );
     const scroll = document.createElement("div");

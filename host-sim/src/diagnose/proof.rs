@@ -78,7 +78,7 @@ pub(super) fn proof(diagnosis: &Diagnosis) -> Section {
         ]
     }));
     if !rows.is_empty() {
-        blocks.push(table(["base law and noise", "found", ""], rows));
+        blocks.push(table(["base law and noise", "found", "uncertainty"], rows));
     }
     section("How much better", blocks)
 }
