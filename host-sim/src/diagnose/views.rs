@@ -1,8 +1,8 @@
 //! What the report of a diagnosis shows of the recordings themselves, and the figures of it.
 //!
-//! The engine's outcome holds models and thinned traces; the recordings are given up once it has run. What a
-//! page needs of them beyond that is taken here, while they are there: the speed along each trace, and the
-//! drag with and without each mechanism over the stretch that shows it most.
+//! The engine's outcome holds models and thinned traces; the recordings are given up to it. What a page needs
+//! of them beyond that is kept here, bounded: a selection of the speeds, for the map over slip and speed, and
+//! short recordings, to run the repaired model with and without each mechanism.
 
 use std::collections::BTreeMap;
 
@@ -13,8 +13,10 @@ use muslip_diagnose::repaired::{Repaired, Which};
 use super::wording::{short_name, spoken};
 use crate::report::{Axis, Cells, Figure, Ink, Shape};
 
-/// Rows of the longest recording that is run again for a picture of an effect.
-const LONGEST_RUN: usize = 300_000;
+/// Rows of all recordings together that are kept for pictures of effects.
+const MOST_ROWS: usize = 300_000;
+/// Speeds that are kept of a recording.
+const MOST_SPEEDS: usize = 4000;
 /// Shortest stretch shown of an effect, in s, ...
 const SHORTEST_STRETCH_S: f64 = 0.6;
 /// ... and longest.
@@ -30,7 +32,36 @@ const MOST_RECORDINGS: usize = 60;
 /// Fewest points of a cell that is coloured.
 const FEWEST: usize = 5;
 
-/// What is taken of the recordings.
+/// What is kept of the recordings while the engine works on them.
+#[derive(Debug, Clone, Default)]
+pub struct Kept {
+    /// Times in s and vehicle speeds in m/s, a selection, by recording.
+    speeds: BTreeMap<String, Vec<(f64, f64)>>,
+    /// Recordings, as many as are short enough.
+    runs: Vec<Run>,
+}
+
+impl Kept {
+    /// Keeps what a page may need.
+    #[must_use]
+    pub fn of(runs: &[Run]) -> Self {
+        let mut room = MOST_ROWS;
+        let mut kept = Self::default();
+        for run in runs {
+            let stride = run.len().div_ceil(MOST_SPEEDS).max(1);
+            let speeds = run.time_s.iter().zip(&run.vehicle_speed_m_s);
+            let speeds = speeds.step_by(stride).map(|(time, speed)| (*time, *speed));
+            kept.speeds.insert(run.name.clone(), speeds.collect());
+            if let Some(left) = room.checked_sub(run.len()) {
+                room = left;
+                kept.runs.push(run.clone());
+            }
+        }
+        kept
+    }
+}
+
+/// What is shown of the recordings.
 #[derive(Debug, Clone, Default)]
 pub struct Views {
     /// Vehicle speed in m/s at the times of each trace, by recording.
@@ -51,15 +82,15 @@ struct Effect {
 }
 
 impl Views {
-    /// Takes what the page of this diagnosis needs of its recordings.
+    /// What the page of this diagnosis shows of its recordings.
     #[must_use]
-    pub fn of(diagnosis: &Diagnosis, runs: &[Run]) -> Self {
+    pub fn of(diagnosis: &Diagnosis, kept: &Kept) -> Self {
         let speeds = diagnosis
             .traces
             .iter()
             .filter_map(|trace| {
-                let run = runs.iter().find(|run| run.name == trace.recording)?;
-                let speeds = trace.time_s.iter().map(|time| speed_at(run, *time));
+                let speeds = kept.speeds.get(&trace.recording)?;
+                let speeds = trace.time_s.iter().map(|time| speed_at(speeds, *time));
                 Some((trace.recording.clone(), speeds.collect()))
             })
             .collect();
@@ -68,7 +99,7 @@ impl Views {
             .tyre
             .iter()
             .enumerate()
-            .filter_map(|(index, term)| effect(diagnosis, runs, index, &term.id))
+            .filter_map(|(index, term)| effect(diagnosis, &kept.runs, index, &term.id))
             .collect();
         Self { speeds, effects }
     }
@@ -182,11 +213,11 @@ impl Views {
     }
 }
 
-/// Vehicle speed of a run at a time, of the row before it.
-fn speed_at(run: &Run, time_s: f64) -> f64 {
-    let after = run.time_s.partition_point(|time| *time <= time_s);
+/// Vehicle speed at a time, of the sample kept before it.
+fn speed_at(speeds: &[(f64, f64)], time_s: f64) -> f64 {
+    let after = speeds.partition_point(|(time, _)| *time <= time_s);
     let at = after.saturating_sub(1);
-    run.vehicle_speed_m_s.get(at).copied().unwrap_or(f64::NAN)
+    speeds.get(at).map_or(f64::NAN, |(_, speed)| *speed)
 }
 
 /// Residuals before and after the repair along a trace.
@@ -214,7 +245,7 @@ fn effect(diagnosis: &Diagnosis, runs: &[Run], index: usize, id: &str) -> Option
         .filter(|interval| interval.balance == "tyre")
         .filter_map(|interval| {
             let run = runs.iter().find(|run| run.name == interval.recording)?;
-            (run.len() <= LONGEST_RUN).then_some((interval, run))
+            Some((interval, run))
         })
         .max_by(|a, b| a.0.z.total_cmp(&b.0.z));
     let (interval, run) = shown?;
