@@ -2,7 +2,7 @@
 
 use super::Campaign;
 use crate::report::{
-    Axis, Block, Cell, Figure, Ink, KeyFigure, Report, Row, Section, Shape, Table, Tone,
+    Axis, Block, Cell, Extent, Figure, Ink, KeyFigure, Report, Row, Section, Shape, Table, Tone,
 };
 use crate::wording::plus_minus;
 
@@ -64,6 +64,7 @@ pub fn index(campaign: &Campaign, rig: &str, command: &str) -> Report {
 }
 
 fn figures(campaign: &Campaign) -> [Figure; 3] {
+    let last = campaign.runs.len() as f64;
     let against_number =
         |caption: &str, label: &str, name: &str, of: fn(&super::Run) -> (f64, f64)| {
             let values = || {
@@ -77,7 +78,7 @@ fn figures(campaign: &Campaign) -> [Figure; 3] {
             with_runs(
                 Figure::new(
                     caption,
-                    Axis::new("run, in the order given"),
+                    Axis::new("run, in the order given").over(Extent::Fixed(0.5, last + 0.5)),
                     Axis::new(label),
                 )
                 .named(name)
@@ -110,14 +111,23 @@ fn figures(campaign: &Campaign) -> [Figure; 3] {
     let both = with_runs(
         Figure::new(
             "Where the peaks lie.",
-            Axis::new("critical slip"),
-            Axis::new("peak friction"),
+            Axis::new("critical slip").over(around(points.iter().map(|point| point.0))),
+            Axis::new("peak friction").over(around(points.iter().map(|point| point.1))),
         )
         .named("peaks"),
         campaign,
         &points,
     );
     [peak, slip, both]
+}
+
+/// All values, with room on either side.
+fn around(values: impl Iterator<Item = f64>) -> Extent {
+    let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| {
+        (low.min(value), high.max(value))
+    });
+    let margin = (0.08 * (high - low)).max(1e-3);
+    Extent::Fixed(low - margin, high + margin)
 }
 
 /// The runs as points, those that stand out as markers.
