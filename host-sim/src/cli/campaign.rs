@@ -51,7 +51,7 @@ pub(super) fn run(arguments: &Arguments, terminal: &mut Terminal) -> Result<(), 
     // Every recording is looked at before the first page is written.
     let mut bytes = 0;
     for recording in &arguments.recordings {
-        bytes += 2 * Recording::open(recording)?.length_bytes();
+        bytes += 2 * Recording::announced_length_bytes(recording)?;
     }
     let pages = page_names(&arguments.recordings);
     let done = AtomicU64::new(0);

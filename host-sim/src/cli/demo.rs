@@ -89,8 +89,7 @@ fn find_concealed(folder: &Path, terminal: &mut Terminal) -> Result<(), Failure>
         write_file(&path, contents)?;
         recordings.push(path);
     }
-    job::prepare_folder(&found)?;
-    let (diagnosis, views) = diagnosed(&rig, &recordings, Ablation::default())?;
+    let (diagnosis, views) = diagnosed(&rig, &recordings, &found, Ablation::default())?;
     let shown: Vec<String> = recordings
         .iter()
         .map(|path| path.display().to_string())

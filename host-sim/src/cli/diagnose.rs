@@ -61,8 +61,7 @@ pub(super) fn run(arguments: &Arguments, terminal: &mut Terminal) -> Result<(), 
         })
         .unwrap_or_default();
     let out = &arguments.out;
-    job::prepare_folder(out)?;
-    let (diagnosis, views) = diagnosed(&arguments.rig, &arguments.recordings, ablation)?;
+    let (diagnosis, views) = diagnosed(&arguments.rig, &arguments.recordings, out, ablation)?;
     let text = job::write(out, &diagnosis, &views, &command(arguments))?;
     if let Some(format) = arguments.format {
         let report = page::report(&diagnosis, &views, "");
@@ -83,10 +82,12 @@ pub(super) fn run(arguments: &Arguments, terminal: &mut Terminal) -> Result<(), 
     Ok(())
 }
 
-/// Reads and diagnoses a campaign under a bar; the demo does too.
+/// Reads and diagnoses a campaign under a bar; the demo does too. The folder for what is found is made
+/// when the input has been read, so that bad input leaves nothing behind.
 pub(super) fn diagnosed(
     rig: &Path,
     recordings: &[PathBuf],
+    out: &Path,
     ablation: Ablation,
 ) -> Result<(Diagnosis, Views), Failure> {
     let bar = Mutex::new(Progress::new("read", STEPS as u64));
@@ -98,6 +99,7 @@ pub(super) fn diagnosed(
     let campaign = load::campaign(rig, recordings, &|share| {
         tell("read", READING * share);
     })?;
+    job::prepare_folder(out)?;
     Ok(job::run(campaign, ablation, &|share, what| {
         tell(what, READING + (STEPS - READING) * share);
     }))

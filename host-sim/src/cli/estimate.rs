@@ -174,7 +174,7 @@ pub(super) struct Job<'a> {
 
 impl Job<'_> {
     pub(super) fn run(&self) -> Result<EstimateResult, Failure> {
-        let bytes = 2 * Recording::open(self.recording_path)?.length_bytes();
+        let bytes = 2 * Recording::announced_length_bytes(self.recording_path)?;
         let mut progress = Progress::bytes("estimate", bytes);
         self.run_reporting(&mut |bytes| progress.done(bytes))
     }

@@ -59,6 +59,16 @@ impl Recording {
         })
     }
 
+    /// Size of a recording before it is opened, for progress bars: of a pipe, which can be opened only
+    /// once, nothing.
+    ///
+    /// # Errors
+    /// [`InputError`] if there is no such file.
+    pub fn announced_length_bytes(path: &Path) -> Result<u64, InputError> {
+        let metadata = std::fs::metadata(path).map_err(|error| unreadable(path, &error))?;
+        Ok(if metadata.is_file() { metadata.len() } else { 0 })
+    }
+
     /// The file as the user named it.
     pub fn path(&self) -> &Path {
         &self.path
