@@ -66,7 +66,11 @@ impl Recording {
     /// [`InputError`] if there is no such file.
     pub fn announced_length_bytes(path: &Path) -> Result<u64, InputError> {
         let metadata = std::fs::metadata(path).map_err(|error| unreadable(path, &error))?;
-        Ok(if metadata.is_file() { metadata.len() } else { 0 })
+        Ok(if metadata.is_file() {
+            metadata.len()
+        } else {
+            0
+        })
     }
 
     /// The file as the user named it.
