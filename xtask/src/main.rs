@@ -3,6 +3,7 @@
 
 mod check;
 mod cycles;
+mod estimators;
 mod figures;
 mod firmware;
 mod image;
@@ -57,6 +58,18 @@ enum Command {
         #[arg(long)]
         check: bool,
     },
+    /// How accurate the estimators are: every bar beside its figure, and the tables that they are from.
+    Estimators {
+        /// Streams of noise a curve.
+        #[arg(default_value_t = 10_000)]
+        streams: u64,
+        /// Write the tables into docs/estimators.md.
+        #[arg(long)]
+        write: bool,
+        /// A python with numpy, scipy and filterpy: also runs docs/scripts/peers.py, on the same streams.
+        #[arg(long, value_name = "PYTHON")]
+        python: Option<String>,
+    },
     /// Build, check, and put the image onto a chip by probe-rs.
     Flash,
     /// The sealed trial of the diagnosis: conceal effects, diagnose, open, judge, write docs/trials.md.
@@ -92,6 +105,11 @@ fn main() -> anyhow::Result<()> {
         }
         Command::Cycles { check: true, .. } => cycles::check(),
         Command::Cycles { json, write, .. } => cycles::run_all(json, write),
+        Command::Estimators {
+            streams,
+            write,
+            python,
+        } => estimators::run_all(streams, write, python.as_deref()),
         Command::Flash => firmware::flash(),
         Command::Trial { arguments } => trial::play(&arguments),
     }

@@ -1,6 +1,7 @@
 //! Filter runs a second on one core: 41 samples each, one by one, in lanes, and by nalgebra.
 //!
-//! `cargo run --release -p muslip --example throughput`
+//! `cargo run --release -p muslip --example throughput -- [RUNS]`, a million runs each if nothing else is said;
+//! `docs/scripts/peers.py rate` adds a row for filterpy.
 #![allow(
     clippy::unwrap_used,
     clippy::indexing_slicing,
@@ -21,6 +22,8 @@ use test_support::noise::Noise;
 
 const POINTS: usize = 41;
 const LANES: usize = 16;
+/// Different streams, in turn.
+const STREAMS: usize = 256;
 const VARIANCE: f32 = 0.0144;
 
 /// Runs side by side: the very same code, an array for each number.
@@ -109,102 +112,128 @@ impl Real for Lanes {
     }
 }
 
-/// Runs a second of a body that makes `each` runs a call.
-fn rate(each: usize, mut body: impl FnMut()) -> f64 {
-    body();
+/// Runs a second of a body that is called with the number of a stream and makes `each` runs a call; until there
+/// were so many runs.
+fn rate(runs: usize, each: usize, mut body: impl FnMut(usize)) -> f64 {
+    (0..STREAMS).for_each(&mut body);
     let start = Instant::now();
-    let mut runs = 0;
-    while start.elapsed().as_secs_f64() < 1.0 {
-        for _ in 0..64 {
-            body();
-        }
-        runs += 64 * each;
+    for call in 0..runs.div_ceil(each) {
+        body(call % STREAMS);
     }
-    runs as f64 / start.elapsed().as_secs_f64()
+    (runs.div_ceil(each) * each) as f64 / start.elapsed().as_secs_f64()
+}
+
+/// The article's filter in matrices, as one would write it.
+fn by_nalgebra(slips: &[f32], frictions: impl Iterator<Item = f32>) -> f32 {
+    let mut x = Vector2::new(0.6_f32, 0.2);
+    let mut p = Matrix2::new(0.36_f32, 0.0, 0.0, 0.04);
+    for (&s, friction) in slips.iter().zip(frictions) {
+        let (s2, sp2) = (s * s, x[1] * x[1]);
+        let w = 1.0 / (sp2 + s2);
+        let h0 = 2.0 * s * x[1] * w;
+        let mu = x[0] * h0;
+        let both = 2.0 * s * (s2 - sp2) * w * w;
+        let h = RowVector2::new(h0, x[0] * both);
+        let second = mu * (sp2 - 3.0 * s2) * w * w;
+        let pd = p[(1, 1)];
+        let r = VARIANCE + pd * (both * both * p[(0, 0)] + second * second * pd);
+        let pht = p * h.transpose();
+        let k = pht / ((h * pht)[0] + r);
+        x += k * (friction - mu);
+        p = (Matrix2::identity() - k * h) * p;
+    }
+    black_box((x, p));
+    x[0]
 }
 
 fn main() {
+    let runs = std::env::args()
+        .nth(1)
+        .map_or(1_000_000, |text| text.parse().unwrap());
     let mut noise = Noise::seeded(1);
     let slips: [f32; POINTS] = std::array::from_fn(|i| (i as f32 / 40.0).powi(2));
-    let frictions: [Lanes; POINTS] = std::array::from_fn(|i| {
-        let r = slips[i] / 0.15;
-        Lanes(std::array::from_fn(|_| {
-            0.7 * r / (1.0 + r * r) + noise.normal(0.04) as f32
-        }))
-    });
-    let one = || {
+    // Lane by lane a stream of its own, so that no branch is foretold by the run before.
+    let streams: Vec<[Lanes; POINTS]> = (0..STREAMS)
+        .map(|_| {
+            std::array::from_fn(|i| {
+                let r = slips[i] / 0.15;
+                Lanes(std::array::from_fn(|_| {
+                    0.7 * r / (1.0 + r * r) + noise.normal(0.04) as f32
+                }))
+            })
+        })
+        .collect();
+    // One by one: a lane of each, side by side in memory.
+    let single: Vec<[f32; POINTS]> = streams
+        .iter()
+        .enumerate()
+        .map(|(stream, frictions)| frictions.map(|friction| friction.0[stream % LANES]))
+        .collect();
+    let first = |stream: usize| black_box(&single)[stream].iter().copied();
+    let one = |stream: usize| {
         let mut x = Range::Aircraft.initial_state::<f32>();
         let mut p = Range::Aircraft.initial_covariance::<f32>();
-        for (slip, friction) in black_box(&slips).iter().zip(black_box(&frictions)) {
-            (x, p) = update_unchecked(x, p, *slip, friction.0[0], VARIANCE);
+        for (slip, friction) in black_box(&slips).iter().zip(first(stream)) {
+            (x, p) = update_unchecked(x, p, *slip, friction, VARIANCE);
         }
         black_box((x, p));
         x.peak_friction
     };
-    let lanes = || {
+    let lanes = |stream: usize| {
         let mut x = Range::Aircraft.initial_state::<Lanes>();
         let mut p = Range::Aircraft.initial_covariance::<Lanes>();
         let variance = Lanes([VARIANCE; LANES]);
-        for (slip, friction) in black_box(&slips).iter().zip(black_box(&frictions)) {
+        for (slip, friction) in black_box(&slips).iter().zip(&black_box(&streams)[stream]) {
             (x, p) = update_unchecked(x, p, Lanes([*slip; LANES]), *friction, variance);
         }
         black_box((x, p));
-        x.peak_friction.0[0]
+        x.peak_friction
     };
-    let by_nalgebra = || {
-        let mut x = Vector2::new(0.6_f32, 0.2);
-        let mut p = Matrix2::new(0.36_f32, 0.0, 0.0, 0.04);
-        for (&s, friction) in black_box(&slips).iter().zip(black_box(&frictions)) {
-            let (s2, sp2) = (s * s, x[1] * x[1]);
-            let w = 1.0 / (sp2 + s2);
-            let h0 = 2.0 * s * x[1] * w;
-            let mu = x[0] * h0;
-            let both = 2.0 * s * (s2 - sp2) * w * w;
-            let h = RowVector2::new(h0, x[0] * both);
-            let second = mu * (sp2 - 3.0 * s2) * w * w;
-            let pd = p[(1, 1)];
-            let r = VARIANCE + pd * (both * both * p[(0, 0)] + second * second * pd);
-            let pht = p * h.transpose();
-            let k = pht / ((h * pht)[0] + r);
-            x += k * (friction.0[0] - mu);
-            p = (Matrix2::identity() - k * h) * p;
-        }
-        black_box((x, p));
-        x[0]
-    };
-    let best = || {
+    let matrices = |stream: usize| by_nalgebra(black_box(&slips), first(stream));
+    let best = |stream: usize| {
         let mut filter = efficient::Config::<f32>::default().build().unwrap();
-        for (slip, friction) in black_box(&slips).iter().zip(black_box(&frictions)) {
-            efficient::update(&mut filter, *slip, friction.0[0], 0.0016);
+        for (slip, friction) in black_box(&slips).iter().zip(first(stream)) {
+            efficient::update(&mut filter, *slip, friction, 0.0016);
         }
         black_box(filter).state().peak_friction
     };
-    assert!((one() - lanes()).abs() < 1e-5 && (one() - by_nalgebra()).abs() < 1e-4);
-    let reference = rate(1, || {
-        by_nalgebra();
+    for stream in 0..STREAMS {
+        let one = one(stream);
+        assert!((one - lanes(stream).0[stream % LANES]).abs() < 1e-5);
+        assert!((one - matrices(stream)).abs() < 1e-4);
+        assert!((best(stream) - 0.35).abs() < 0.2);
+    }
+    let reference = rate(runs, 1, |stream| {
+        matrices(stream);
     });
-    println!("| runs of 41 samples, `f32`, one core | runs a second | over nalgebra |");
-    println!("| --- | --- | --- |");
+    println!("| runs of 41 samples, `f32`, one core | runs | runs a second | over nalgebra |");
+    println!("| --- | --- | --- | --- |");
     let row = |name: &str, rate: f64| {
-        println!("| {name} | {:.2e} | {:.2} |", rate, rate / reference);
+        println!("| {name} | {runs} | {rate:.2e} | {:.2} |", rate / reference);
     };
     row("nalgebra, generic matrices", reference);
-    row(
-        "the lean update, one by one",
-        rate(1, || {
-            one();
-        }),
-    );
-    row(
-        "the lean update, 16 runs side by side",
-        rate(LANES, || {
-            lanes();
-        }),
-    );
+    let lean = rate(runs, 1, |stream| {
+        one(stream);
+    });
+    row("the lean update, one by one", lean);
+    let side_by_side = rate(runs, LANES, |stream| {
+        lanes(stream);
+    });
+    row("the lean update, 16 runs side by side", side_by_side);
     row(
         "the efficient estimator, one by one",
-        rate(1, || {
-            best();
+        rate(runs, 1, |stream| {
+            best(stream);
         }),
+    );
+    println!();
+    println!(
+        "Bar: side by side at least 4 times the one-by-one loop: {:.1}, {}.",
+        side_by_side / lean,
+        if side_by_side >= 4.0 * lean {
+            "met"
+        } else {
+            "missed"
+        }
     );
 }

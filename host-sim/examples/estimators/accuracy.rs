@@ -1,22 +1,223 @@
-//! Accuracy over the article's range and under other conditions.
+//! Accuracy and consistency over a grid of curves, beside batch maximum likelihood.
 
 use host_sim::fit::Curve;
 
-use super::contenders::{article_run, efficient_run, iterated_run, unscented_run};
-use super::streams::{Disturbance, article_slips, bound, grid, rig_slips};
-use super::summary::{Summary, run};
+use super::contenders::{article_run, efficient_run};
+use super::innovations::Bands;
+use super::kalman::{iterated_run, unscented_run};
+use super::page::{Page, pair, signed, with_error};
+use super::streams::{Disturbance, article_slips, bound, grid};
+use super::summary::{Contender, Ratio, Summary, Versus, run};
 
-pub fn accuracy(seeds: u64) {
+/// Share of 1-sigma ellipses of two dimensions that hold the truth, 1 - e^-½.
+const ELLIPSE: f64 = 39.3;
+
+/// The worst of the curves, each figure with the curve that it is from.
+pub struct Worst {
+    pub rmse: [(Ratio, Curve); 2],
+    /// Of all RMSE ratios.
+    pub mean: f64,
+    /// |bias| beyond maximum likelihood's, in sigmas of the bound.
+    pub bias: f64,
+    /// The ratio furthest from one.
+    pub nees: (Ratio, Curve),
+    /// Coverage in percent furthest from [`ELLIPSE`], as a difference, and its standard error.
+    pub ellipse: [f64; 2],
+    pub curves: f64,
+    /// Shares of runs inside their 95 % bands, over all curves.
+    pub inside: [f64; 3],
+    pub nis: f64,
+    pub lag: f64,
+}
+
+impl Worst {
+    pub fn none() -> Self {
+        let nowhere = Curve {
+            peak_friction: 0.0,
+            critical_slip: 0.0,
+        };
+        let ratio = |value| Ratio { value, error: 0.0 };
+        Self {
+            rmse: [(ratio(0.0), nowhere); 2],
+            mean: 0.0,
+            bias: f64::MIN,
+            nees: (ratio(1.0), nowhere),
+            ellipse: [0.0; 2],
+            curves: 0.0,
+            inside: [0.0; 3],
+            nis: 0.0,
+            lag: 0.0,
+        }
+    }
+
+    fn take(&mut self, truth: Curve, limit: [f64; 2], ml: &Summary, versus: &Versus) {
+        self.curves += 1.0;
+        let running = |mean: &mut f64, value: f64| *mean += (value - *mean) / self.curves;
+        for i in 0..2 {
+            if versus.rmse[i].value > self.rmse[i].0.value {
+                self.rmse[i] = (versus.rmse[i], truth);
+            }
+            self.bias = self.bias.max(beyond(limit, ml, &versus.summary)[i]);
+        }
+        running(
+            &mut self.mean,
+            0.5 * (versus.rmse[0].value + versus.rmse[1].value),
+        );
+        if (versus.nees.value - 1.0).abs() > (self.nees.0.value - 1.0).abs() {
+            self.nees = (versus.nees, truth);
+        }
+        let Summary {
+            coverage, streams, ..
+        } = versus.summary;
+        let ellipse = 100.0 * coverage - ELLIPSE;
+        if ellipse.abs() > self.ellipse[0].abs() {
+            let error = 100.0 * (coverage * (1.0 - coverage) / streams).sqrt();
+            self.ellipse = [ellipse, error];
+        }
+        for (inside, share) in self.inside.iter_mut().zip(versus.summary.inside) {
+            running(inside, share);
+        }
+        running(&mut self.nis, versus.summary.nis);
+        running(&mut self.lag, versus.summary.lag);
+    }
+
+    /// Over the grid of curves.
+    pub fn over_grid(
+        slips: &[f64],
+        disturbance: Disturbance,
+        seeds: u64,
+        contender: &Contender<'_>,
+    ) -> Self {
+        let mut worst = Self::none();
+        for truth in grid() {
+            let (ml, [versus]) = run(truth, slips, disturbance, seeds, [contender]);
+            worst.take(truth, bound(truth, slips), &ml, &versus);
+        }
+        worst
+    }
+
+    /// The larger of both RMSE ratios.
+    pub fn worst_rmse(&self) -> Ratio {
+        let [(a, _), (b, _)] = self.rmse;
+        if a.value > b.value { a } else { b }
+    }
+
+    /// NEES off maximum likelihood's, in percent, with its standard error.
+    pub fn nees_off(&self) -> String {
+        let Ratio { value, error } = self.nees.0;
+        format!("{:+.1} ± {:.1} %", 100.0 * (value - 1.0), 100.0 * error)
+    }
+
+    /// The bars on accuracy and on the covariance.
+    pub fn bars(&self, page: &mut Page, name: &str) {
+        let ratio = self.worst_rmse();
+        page.bar(
+            &format!("{name}: RMSE over ML's, worst of 50"),
+            "at most 1.03",
+            with_error(ratio),
+            ratio.value <= 1.03,
+        );
+        page.bar(
+            &format!("{name}: bias beyond ML's, sigmas of the bound, worst of 50"),
+            "at most 0.05",
+            format!("{:+.3}", self.bias),
+            self.bias <= 0.05,
+        );
+        page.bar(
+            &format!("{name}: mean NEES off ML's, worst of 25"),
+            "at most 5 %",
+            self.nees_off(),
+            (self.nees.0.value - 1.0).abs() <= 0.05,
+        );
+        page.bar(
+            &format!("{name}: 1-sigma ellipse holds the truth, furthest of 25"),
+            "39.3 ± 2 %",
+            format!(
+                "{:.1} ± {:.1} %",
+                ELLIPSE + self.ellipse[0],
+                self.ellipse[1]
+            ),
+            self.ellipse[0].abs() <= 2.0,
+        );
+    }
+
+    /// The bars on innovations; `scores`: as the noise is still being learnt, by Student's t.
+    pub fn innovation_bars(&self, page: &mut Page, name: &str, count: f64, scores: bool) {
+        let bands = Bands::of(count);
+        let [low, high] = bands.squares.map(|sum| sum / count);
+        let share = |share: f64| format!("{:.1} % of runs", 100.0 * share);
+        // One run in twenty is outside its own band if all is as it should be.
+        let enough = |share: f64| share >= 0.94;
+        page.bar(
+            &format!("{name}: mean NIS once the noise has been learnt"),
+            &format!("inside one run's 95 % band, {low:.3} to {high:.3}"),
+            format!("{:.3}", self.nis),
+            (low..=high).contains(&self.nis),
+        );
+        let (what, inside) = if scores {
+            ("NIS as Student's t inside its 95 % band", self.inside[1])
+        } else {
+            ("NIS inside its 95 % band", self.inside[0])
+        };
+        page.bar(
+            &format!("{name}: {what}"),
+            "95 % of runs, less 1",
+            share(inside),
+            enough(inside),
+        );
+        page.bar(
+            &format!(
+                "{name}: innovations white, lag-1 correlation inside ±{:.3}",
+                bands.lag
+            ),
+            "95 % of runs, less 1",
+            share(self.inside[2]),
+            enough(self.inside[2]),
+        );
+    }
+}
+
+/// |bias| beyond maximum likelihood's, in sigmas of the bound.
+fn beyond(limit: [f64; 2], ml: &Summary, summary: &Summary) -> [f64; 2] {
+    [0, 1].map(|i| (summary.bias[i].abs() - ml.bias[i].abs()) / limit[i])
+}
+
+/// RMSE over the bound, as the page states it.
+fn over(limit: [f64; 2], summary: &Summary) -> String {
+    let ratio = |i: usize| {
+        let ratio = summary.rmse[i] / limit[i];
+        if ratio < 100.0 {
+            format!("{ratio:.2}")
+        } else {
+            ">100".to_owned()
+        }
+    };
+    format!("{}, {}", ratio(0), ratio(1))
+}
+
+pub fn accuracy(page: &mut Page, seeds: u64) {
     let slips = article_slips();
-    println!("### Over the article's range, 41 samples, sigma 0.04, {seeds} streams a curve\n");
-    println!(
-        "RMSE over the Cramér-Rao bound (mup, sp) of batch maximum likelihood (ML), the article's filter, an iterated extended and an unscented Kalman filter (both told the true noise); the efficient estimator in `f32` over ML on the same streams; its bias beyond ML's in sigmas of the bound; its mean NEES over ML's; how often its 1-sigma ellipse holds the truth (39.3 %); mean NIS and lag-1 correlation of the second half's innovations.\n"
+    page.section(&format!(
+        "Over the article's range, 41 samples, sigma 0.04, {seeds} streams a curve"
+    ));
+    page.paragraph(
+        "RMSE over the Cramér-Rao bound (mup, sp) of batch maximum likelihood (ML), the article's filter, an iterated extended and an unscented Kalman filter (both told the true noise); the efficient estimator in `f32` over ML on the same streams, with the standard error of its last digits; its bias beyond ML's in sigmas of the bound.",
     );
-    println!(
-        "| mup | sp | ML / bound | article / bound | iterated / bound | unscented / bound | efficient / ML | bias beyond ML's | NEES / ML's | ellipse, % | NIS | lag 1 |"
-    );
-    println!("| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |");
-    let mut worst = [0.0_f64; 4];
+    let columns = [
+        "mup",
+        "sp",
+        "ML / bound",
+        "article / bound",
+        "iterated / bound",
+        "unscented / bound",
+        "efficient / bound",
+        "efficient / ML: mup",
+        "sp",
+        "bias beyond ML's",
+    ];
+    page.columns(&columns);
+    let mut worst = Worst::none();
+    let mut consistency = Vec::new();
     for truth in grid() {
         let limit = bound(truth, &slips);
         let (ml, [efficient, article, iterated, unscented]) = run(
@@ -31,193 +232,56 @@ pub fn accuracy(seeds: u64) {
                 &unscented_run,
             ],
         );
-        let over = |s: &Summary| {
-            let ratio = |index: usize| {
-                let ratio = s.rmse[index] / limit[index];
-                if ratio < 100.0 {
-                    format!("{ratio:.2}")
-                } else {
-                    ">100".to_owned()
-                }
-            };
-            format!("{}, {}", ratio(0), ratio(1))
-        };
-        let ratio = [0, 1].map(|i| efficient.rmse[i] / ml.rmse[i]);
-        let beyond = [0, 1].map(|i| (efficient.bias[i].abs() - ml.bias[i].abs()) / limit[i]);
-        println!(
-            "| {} | {} | {} | {} | {} | {} | {:.3}, {:.3} | {:+.3}, {:+.3} | {:.3} | {:.1} | {:.3} | {:+.3} |",
-            truth.peak_friction,
-            truth.critical_slip,
-            over(&ml),
-            over(&article),
-            over(&iterated),
-            over(&unscented),
-            ratio[0],
-            ratio[1],
-            beyond[0],
-            beyond[1],
-            efficient.nees / ml.nees,
-            100.0 * efficient.coverage,
-            efficient.nis,
-            efficient.lag
+        let names = [truth.peak_friction, truth.critical_slip].map(|value| value.to_string());
+        let mut row = names.to_vec();
+        row.push(over(limit, &ml));
+        row.extend(
+            [&article, &iterated, &unscented, &efficient].map(|of| over(limit, &of.summary)),
         );
-        worst[0] = worst[0].max(ratio[0]).max(ratio[1]);
-        worst[1] = worst[1].max(beyond[0]).max(beyond[1]);
-        worst[2] = worst[2].max((efficient.nees / ml.nees - 1.0).abs());
-        worst[3] = worst[3].max((100.0 * efficient.coverage - 39.3).abs());
-    }
-    println!(
-        "\nWorst, beside the bar: RMSE {:.3} of ML's (1.03); bias {:+.3} sigma beyond ML's (0.05); NEES off ML's by {:.1} % (5); ellipse off 39.3 % by {:.1} (2).\n",
-        worst[0],
-        worst[1],
-        100.0 * worst[2],
-        worst[3]
-    );
-}
+        row.extend(efficient.rmse.map(with_error));
+        row.push(signed(beyond(limit, &ml, &efficient.summary), 3));
+        page.row(&row);
 
-/// Worst ratios to batch maximum likelihood on streams without outliers, over the grid.
-pub fn worst_over_grid(
-    name: &str,
-    bar: &str,
-    slips: &[f64],
-    disturbance: Disturbance,
-    seeds: u64,
-    declared: f64,
-) {
-    let mut ratio = [0.0_f64; 2];
-    let mut at = [Curve {
-        peak_friction: 0.0,
-        critical_slip: 0.0,
-    }; 2];
-    let mut nees = 0.0_f64;
-    let mut mean = 0.0;
-    for truth in grid() {
-        let (ml, [efficient]) = run(
-            truth,
-            slips,
-            disturbance,
-            seeds,
-            [&|truth, stream| efficient_run(truth, stream, declared)],
-        );
-        for index in 0..2 {
-            let here = efficient.rmse[index] / ml.rmse[index];
-            mean += here / 50.0;
-            if here > ratio[index] {
-                ratio[index] = here;
-                at[index] = truth;
-            }
-        }
-        let off = efficient.nees / ml.nees - 1.0;
-        if off.abs() > nees.abs() {
-            nees = off;
-        }
+        let mut row = names.to_vec();
+        let Summary {
+            nees,
+            coverage,
+            nis,
+            lag,
+            inside,
+            ..
+        } = efficient.summary;
+        row.push(pair([nees, ml.nees], 3));
+        row.push(with_error(efficient.nees));
+        row.push(format!("{:.1}", 100.0 * coverage));
+        row.push(format!("{nis:.3}"));
+        row.push(pair([100.0 * inside[0], 100.0 * inside[1]], 1));
+        row.push(format!("{lag:+.3}"));
+        row.push(format!("{:.1}", 100.0 * inside[2]));
+        consistency.push(row);
+        worst.take(truth, limit, &ml, &efficient);
     }
-    println!(
-        "| {name} | {:.3} at ({}, {}) | {:.3} at ({}, {}) | {mean:.3} | {:+.1} % | {bar} |",
-        ratio[0],
-        at[0].peak_friction,
-        at[0].critical_slip,
-        ratio[1],
-        at[1].peak_friction,
-        at[1].critical_slip,
-        100.0 * nees
-    );
-}
-
-pub fn conditions(seeds: u64) {
-    println!("### Under other conditions\n");
-    println!(
-        "RMSE of the efficient estimator (`f32`) over that of ML on the same streams; ML sees no outliers. The worst of the 25 curves, and the mean of both ratios over them.\n"
-    );
-    println!(
-        "| condition | mup, worst | sp, worst | mean | NEES off ML's, worst | bar |\n| --- | --- | --- | --- | --- | --- |"
-    );
-    let short = article_slips();
-    let long = rig_slips();
-    let none = Disturbance::default();
-    worst_over_grid(
-        "noise declared half of what it is",
-        "1.03; 5 %",
-        &short,
-        none,
-        seeds,
-        0.5,
-    );
-    worst_over_grid(
-        "noise declared half as much again",
-        "1.03; 5 %",
-        &short,
-        none,
-        seeds,
-        1.5,
-    );
-    let fewer = (seeds / 50).max(20);
-    worst_over_grid(
-        &format!("10,000 samples of a rig, {fewer} streams a curve"),
-        "1.03; 5 %",
-        &long,
-        none,
-        fewer,
-        1.0,
-    );
-    let outliers = Disturbance {
-        outliers: 0.05,
-        ..none
-    };
-    worst_over_grid(
-        "5 % outliers of 10 sigma, 41 samples",
-        "1.10",
-        &short,
-        outliers,
-        seeds,
-        1.0,
-    );
-    worst_over_grid(
-        &format!("5 % outliers of 10 sigma, 10,000 samples, {fewer} streams"),
-        "1.10",
-        &long,
-        outliers,
-        fewer,
-        1.0,
-    );
-    println!();
-    println!(
-        "Slip noise is not modelled. Mean error of sp and mup in percent with a slip noise of 0.005 and 0.01 (1-sigma), 41 samples and 10,000, at mup 0.6, sp 0.15: ML takes the noisy slip as known, too.\n"
-    );
-    println!(
-        "| slip noise | samples | efficient: mup, sp | ML: mup, sp | article: mup, sp |\n| --- | --- | --- | --- | --- |"
-    );
-    let truth = Curve {
-        peak_friction: 0.6,
-        critical_slip: 0.15,
-    };
-    for slip_std in [0.005, 0.01] {
-        for (slips, seeds) in [(&short, seeds), (&long, fewer)] {
-            let (ml, [efficient, article]) = run(
-                truth,
-                slips,
-                Disturbance { slip_std, ..none },
-                seeds,
-                [
-                    &|truth, stream| efficient_run(truth, stream, 1.0),
-                    &article_run,
-                ],
-            );
-            let percent = |s: &Summary| {
-                format!(
-                    "{:+.2}, {:+.2}",
-                    100.0 * s.bias[0] / 0.6,
-                    100.0 * s.bias[1] / 0.15
-                )
-            };
-            println!(
-                "| {slip_std} | {} | {} | {} | {} |",
-                slips.len(),
-                percent(&efficient),
-                percent(&ml),
-                percent(&article)
-            );
-        }
+    page.line("");
+    let [low, high] = Bands::of(20.0).squares;
+    page.paragraph(format!(
+        "Consistency of the efficient estimator. Mean NEES, its and ML's, and their ratio; how often its 1-sigma ellipse holds the truth (39.3 %); of the second half's 20 innovations: mean normalised square (NIS), share of runs whose sum is inside the 95 % band of chi-squared ({low:.1} to {high:.1}), the same with each innovation taken as Student's t with as many degrees of freedom as samples before it less two; mean lag-1 correlation and share of runs inside its 95 % band (±{:.3}). After 20 to 40 samples the noise is known to 11 to 16 %, so that even perfectly learnt noise makes a mean NIS of ν/(ν - 2), averaged 1.07, and chi-squared too narrow a band: Student's t is the band that belongs to it.",
+        Bands::of(20.0).lag
+    ));
+    page.columns(&[
+        "mup",
+        "sp",
+        "NEES, ML's",
+        "NEES / ML's",
+        "ellipse, %",
+        "NIS",
+        "inside, %: chi-squared, Student's t",
+        "lag 1",
+        "inside, %",
+    ]);
+    for row in consistency {
+        page.row(&row);
     }
-    println!();
+    page.line("");
+    worst.bars(page, "41 samples");
+    worst.innovation_bars(page, "41 samples", 20.0, true);
 }

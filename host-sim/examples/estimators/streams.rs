@@ -9,6 +9,9 @@ use rand_distr::StandardNormal;
 
 pub const SIGMA: f64 = 0.04;
 
+/// How far off an outlier is, in sigmas.
+pub const OUTLIER: f64 = 10.0;
+
 pub const PEAKS: [f64; 5] = [0.1, 0.2, 0.35, 0.6, 1.0];
 
 pub const SLIPS: [f64; 5] = [0.10, 0.125, 0.15, 0.175, 0.20];
@@ -40,9 +43,11 @@ pub struct Disturbance {
     pub slip_std: f64,
 }
 
+#[derive(Clone)]
 pub struct Stream {
     pub slips: Vec<f64>,
     pub frictions: Vec<f64>,
+    /// The frictions before outliers.
     pub clean: Vec<f64>,
 }
 
@@ -58,7 +63,7 @@ pub fn stream(truth: Curve, slips: &[f64], disturbance: Disturbance, seed: u64) 
         .map(|&friction| {
             let (hit, side) = (rng.random::<f64>(), rng.random::<f64>());
             if hit < disturbance.outliers {
-                friction + 10.0 * SIGMA * if side < 0.5 { -1.0 } else { 1.0 }
+                friction + OUTLIER * SIGMA * if side < 0.5 { -1.0 } else { 1.0 }
             } else {
                 friction
             }
