@@ -173,18 +173,18 @@ def rate(runs):
         article_by_filterpy(slips, frictions, start, sigma)
     by_filterpy = FILTERPY_RUNS / (time.process_time() - begin)
 
-    table.append(f"| filterpy, the same filter, double precision | {FILTERPY_RUNS} | {by_filterpy:.2e} | {by_filterpy / by_nalgebra:.5f} |")
-    for row in table:
+    filterpy = f"| filterpy, the same filter, double precision | {FILTERPY_RUNS} | {by_filterpy:.2e} | {by_filterpy / by_nalgebra:.5f} |"
+    end = max(number for number, row in enumerate(table) if row.startswith("|")) + 1
+    for row in (*table[:end], filterpy, *table[end:]):
+        cells = row.split("|")
         if not row.startswith("|"):
             print(row)
-            continue
-        cells = row.rstrip(" |").split("|")
-        if cells[1].strip().startswith("runs of"):
-            print(f"{row.rstrip()} over filterpy |")
+        elif cells[1].strip().startswith("runs of"):
+            print(f"{row} over filterpy |")
         elif set(row) <= set("|- "):
-            print(f"{row.rstrip()} --- |")
+            print(f"{row} --- |")
         else:
-            print(f"{row.rstrip()} {float(cells[3]) / by_filterpy:.0f} |")
+            print(f"{row} {float(cells[3]) / by_filterpy:.0f} |")
     print(f"\n{versions()}, Python {sys.version.split()[0]}.")
 
 

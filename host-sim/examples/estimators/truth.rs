@@ -37,12 +37,13 @@ struct Comparison {
     squares_of_batch: [f64; 2],
 }
 
-fn compare(truth: Curve, seed: u64) -> Option<Comparison> {
+/// `randomness` numbers the particles' own.
+fn compare(truth: Curve, seed: u64, randomness: u64) -> Option<Comparison> {
     let stream = stream(truth, &article_slips(), Disturbance::default(), seed);
     let batch = batch(truth, &stream)?;
     let prior = Prior::of(range(truth));
     let grid = dense(prior, &stream);
-    let halves = [0, 1].map(|half| particle_filter(prior, &stream, HALF, 2 * seed + half));
+    let halves = [0, 1].map(|half| particle_filter(prior, &stream, HALF, 2 * randomness + half));
     let [one, other] = halves.map(|half| half.covariance);
     let both = Posterior {
         mean: [0, 1].map(|i| 0.5 * (halves[0].mean[i] + halves[1].mean[i])),
@@ -91,7 +92,7 @@ fn root_mean_square(all: &[Comparison], of: impl Fn(&Comparison) -> [f64; 2]) ->
 
 /// Prints the tables.
 pub fn truth(page: &mut Page, seeds: u64) {
-    let seeds = (seeds / 50).max(20);
+    let seeds = (seeds / 50).max(60);
     page.section("A particle filter as truth");
     page.paragraph(format!(
         "Posterior of (mup, sp) under the efficient estimator's own prior (mup N(start, start²) above zero, ln sp N(start, ½)) and the true noise, 41 samples, {seeds} streams a curve. Particles: resample-move (resampling at half the effective number, then six steps of Metropolis on all samples so far), two filters of {HALF} with independent randomness; half their difference is the Monte Carlo error of their mean. Grid: 300 by 300 points over where the posterior is, in another form of the law. All in standard deviations of the posterior; mup, sp."
@@ -111,14 +112,14 @@ pub fn truth(page: &mut Page, seeds: u64) {
     ]);
     let (mut errors, mut off, mut curves) = (0.0, 0.0, 0.0);
     let mut furthest: f64 = 0.0;
-    for (peak_friction, critical_slip) in CURVES {
+    for (number, (peak_friction, critical_slip)) in (0..).zip(CURVES) {
         let truth = Curve {
             peak_friction,
             critical_slip,
         };
         let all: Vec<Comparison> = (0..seeds)
             .into_par_iter()
-            .filter_map(|seed| compare(truth, seed))
+            .filter_map(|seed| compare(truth, seed, number * seeds + seed))
             .collect();
         let monte_carlo = root_mean_square(&all, |c| c.monte_carlo);
         let off_grid = root_mean_square(&all, |c| c.particles_off_grid);
