@@ -3,7 +3,7 @@
 use host_sim::fit::Curve;
 
 use super::accuracy::Worst;
-use super::contenders::{article_run, efficient_run};
+use super::contenders::{article_run, efficient_run, ungated_run};
 use super::page::{Page, signed, with_error};
 use super::robust::{Loss, robust_run, told_run};
 use super::streams::{Disturbance, article_slips, rig_slips};
@@ -63,6 +63,15 @@ pub fn conditions(page: &mut Page, seeds: u64) {
     row(page, &long_name, &worst);
     worst.bars(page, "10,000 samples");
     worst.innovation_bars(page, "10,000 samples", 4999.0, false);
+    for (name, slips, seeds, declared) in [
+        ("half the noise", &short, seeds, 0.5),
+        ("10,000 samples", &long, fewer, 1.0),
+    ] {
+        let worst = Worst::over_grid(slips, none, seeds, &|truth, stream| {
+            ungated_run(truth, stream, declared)
+        });
+        row(page, &format!("{name}, `nis_gate: None`"), &worst);
+    }
     outliers(page, seeds, fewer);
     slip_noise(page, seeds, fewer);
 }

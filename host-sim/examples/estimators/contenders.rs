@@ -55,10 +55,13 @@ pub fn batch(truth: Curve, stream: &Stream) -> Option<Outcome> {
 
 /// The efficient estimator in single precision, told `declared` times the noise, with its learnt over the
 /// declared variance.
-pub fn efficient_with_noise(truth: Curve, stream: &Stream, declared: f64) -> (Outcome, f64) {
-    let mut filter = efficient::Config::<f32>::for_range(range(truth))
-        .build()
-        .unwrap();
+pub fn efficient_with_noise(
+    config: efficient::Config<f32>,
+    truth: Curve,
+    stream: &Stream,
+    declared: f64,
+) -> (Outcome, f64) {
+    let mut filter = config.build().unwrap();
     let mut watch = Watch::over(stream.slips.len());
     for (&slip, &friction) in stream.slips.iter().zip(&stream.frictions) {
         let fusion = filter
@@ -94,7 +97,17 @@ pub fn efficient_with_noise(truth: Curve, stream: &Stream, declared: f64) -> (Ou
 }
 
 pub fn efficient_run(truth: Curve, stream: &Stream, declared: f64) -> Outcome {
-    efficient_with_noise(truth, stream, declared).0
+    let config = efficient::Config::for_range(range(truth));
+    efficient_with_noise(config, truth, stream, declared).0
+}
+
+/// The same without its gate: it believes every sample.
+pub fn ungated_run(truth: Curve, stream: &Stream, declared: f64) -> Outcome {
+    let config = efficient::Config {
+        nis_gate: None,
+        ..efficient::Config::for_range(range(truth))
+    };
+    efficient_with_noise(config, truth, stream, declared).0
 }
 
 pub fn article_run(truth: Curve, stream: &Stream) -> Outcome {

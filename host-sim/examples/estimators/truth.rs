@@ -1,6 +1,7 @@
 //! The efficient estimator beside the posterior itself.
 
 use host_sim::fit::Curve;
+use muslip::filter::efficient;
 use muslip::filter::mu_slip::Covariance;
 use rayon::prelude::*;
 
@@ -41,7 +42,8 @@ struct Comparison {
 fn compare(truth: Curve, seed: u64, randomness: u64) -> Option<Comparison> {
     let stream = stream(truth, &article_slips(), Disturbance::default(), seed);
     let batch = batch(truth, &stream)?;
-    let prior = Prior::of(range(truth));
+    let range = range(truth);
+    let prior = Prior::of(range);
     let grid = dense(prior, &stream);
     let halves = [0, 1].map(|half| particle_filter(prior, &stream, HALF, 2 * randomness + half));
     let [one, other] = halves.map(|half| half.covariance);
@@ -55,7 +57,8 @@ fn compare(truth: Curve, seed: u64, randomness: u64) -> Option<Comparison> {
         },
     };
     let std = both.std();
-    let (efficient, noise_factor) = efficient_with_noise(truth, &stream, 1.0);
+    let (efficient, noise_factor) =
+        efficient_with_noise(efficient::Config::for_range(range), truth, &stream, 1.0);
     let p = efficient.covariance;
     let efficient_std = [p.p00, p.p11].map(|variance| (variance / noise_factor).sqrt());
     let correlation = |p: Covariance<f64>| p.p01 / (p.p00 * p.p11).sqrt();
