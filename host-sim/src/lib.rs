@@ -17,5 +17,6 @@ pub mod report;
 pub mod rig_file;
 pub mod rig_link;
 pub mod simulate;
+pub mod text;
 pub mod thin;
 pub mod wording;

@@ -8,7 +8,7 @@ use std::fs::{self, File};
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
-use tempfile::NamedTempFile;
+use tempfile::{NamedTempFile, TempDir};
 
 /// An output that could not be written.
 #[derive(Debug, thiserror::Error)]
@@ -166,6 +166,70 @@ pub fn create_folder(path: &Path) -> Result<(), OutputError> {
     fs::create_dir_all(path).map_err(|error| OutputError::new(path, error))
 }
 
+/// Files that take their places together, in a folder that is made for them if it is not there.
+///
+/// Dropped without a commit, they leave no trace, and neither does a folder that was made.
+#[derive(Debug)]
+pub struct StagedFolder {
+    destination: PathBuf,
+    /// Inside the destination, so that files are renamed and never copied.
+    stage: Option<TempDir>,
+    /// Whether the folder was not there before.
+    made: bool,
+}
+
+impl StagedFolder {
+    /// Starts the files of a folder.
+    ///
+    /// # Errors
+    /// [`OutputError`] if the folder cannot be made or written.
+    pub fn create(destination: &Path) -> Result<Self, OutputError> {
+        let made = !destination.exists();
+        create_folder(destination)?;
+        let stage = tempfile::Builder::new()
+            .prefix(".muslip-")
+            .tempdir_in(destination)
+            .map_err(|error| OutputError::new(destination, error))?;
+        Ok(Self {
+            destination: destination.to_owned(),
+            stage: Some(stage),
+            made,
+        })
+    }
+
+    /// Where a file is written until the commit.
+    pub fn path(&self, name: &str) -> PathBuf {
+        let stage = self.stage.as_ref().map(TempDir::path);
+        stage.unwrap_or(&self.destination).join(name)
+    }
+
+    /// Puts the files of these names in their places.
+    ///
+    /// # Errors
+    /// [`OutputError`] naming the first file that cannot take its place.
+    pub fn commit<'a>(
+        mut self,
+        names: impl IntoIterator<Item = &'a str>,
+    ) -> Result<(), OutputError> {
+        for name in names {
+            let path = self.destination.join(name);
+            fs::rename(self.path(name), &path).map_err(|error| OutputError::new(&path, error))?;
+        }
+        self.made = false;
+        Ok(())
+    }
+}
+
+impl Drop for StagedFolder {
+    fn drop(&mut self) {
+        drop(self.stage.take());
+        if self.made {
+            // Only an empty folder goes; one that cannot be removed stays, which is no harm.
+            let _ = fs::remove_dir(&self.destination);
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -191,6 +255,27 @@ mod tests {
         write_file(&path, b"new").unwrap();
         assert_eq!(fs::read_to_string(&path).unwrap(), "new");
         assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
+    }
+
+    #[test]
+    fn staged_files_appear_together_or_leave_no_trace() {
+        let folder = tempfile::tempdir().unwrap();
+        let out = folder.path().join("out");
+        for committed in [false, true] {
+            let staged = StagedFolder::create(&out).unwrap();
+            for name in ["a", "b"] {
+                write_file(&staged.path(name), name.as_bytes()).unwrap();
+                assert!(!out.join(name).exists());
+            }
+            if committed {
+                staged.commit(["a", "b"]).unwrap();
+                assert_eq!(fs::read_to_string(out.join("b")).unwrap(), "b");
+                assert_eq!(fs::read_dir(&out).unwrap().count(), 2);
+            } else {
+                drop(staged);
+                assert!(!out.exists());
+            }
+        }
     }
 
     #[test]

@@ -77,11 +77,13 @@ muslip.plusMinus = (value, std) => {
   return `${value.toFixed(decimals)}\u00a0±\u00a0${std.toFixed(decimals)}`.replace("-", "\u2212");
 };
 
-/** A zoom that holds still while an ellipse shrinks to half its size: ends of an axis. */
-muslip.zoom = (centre, std) => {
+/** A zoom that holds still while an ellipse shrinks to half its size: ends of an axis. What is true is in it, unless the ellipse would be a dot beside it. */
+muslip.zoom = (centre, std, truth) => {
   const half = 2 ** Math.ceil(Math.log2(2.2 * Math.max(std, 1e-9)));
   const middle = Math.round(centre / (half / 2)) * (half / 2);
-  return [middle - 1.3 * half, middle + 1.3 * half];
+  const [low, high] = [middle - 1.3 * half, middle + 1.3 * half];
+  if (truth === undefined || Math.abs(truth - centre) > 8 * half) return [low, high];
+  return [Math.min(low, truth - 0.3 * half), Math.max(high, truth + 0.3 * half)];
 };
 
 muslip.Player = class {
@@ -114,7 +116,11 @@ muslip.Player = class {
     muslip.figures.forEach((figure) => figure.update(changes));
     const { peak, peakStd, criticalSlip, criticalSlipStd } = run.frames;
     const k = this.shown;
-    this.ellipse.zoom(muslip.zoom(criticalSlip[k], criticalSlipStd[k]), muslip.zoom(peak[k], peakStd[k]));
+    const truth = this.ellipse.spec.layers.find((layer) => layer.ink === "truth");
+    this.ellipse.zoom(
+      muslip.zoom(criticalSlip[k], criticalSlipStd[k], truth?.x[0]),
+      muslip.zoom(peak[k], peakStd[k], truth?.y[0]),
+    );
     this.slider.max = this.last;
     this.slider.value = k;
     this.note.textContent = this.words(k);

@@ -131,7 +131,16 @@ muslip.Figure = (() => {
     }
     return splits.filter((value) => value >= min * 0.999 && value <= max * 1.001);
   };
-  const logLabels = (u, splits) => splits.map((v) => (v >= 1e-4 && v < 1e7 ? String(Number(v.toPrecision(3))) : v.toExponential()));
+  const SUPERSCRIPTS = { "-": "\u207b", 0: "\u2070", 1: "\u00b9", 2: "\u00b2", 3: "\u00b3", 4: "\u2074", 5: "\u2075", 6: "\u2076", 7: "\u2077", 8: "\u2078", 9: "\u2079" };
+  const power = (exponent) => `10${String(exponent).replace(/./g, (letter) => SUPERSCRIPTS[letter])}`;
+  const logLabels = (u, splits) => {
+    // Short numbers as they are; where there are others, every power of ten is one.
+    const short = splits.every((v) => v >= 9e-4 && v < 2e5);
+    return splits.map((v) => {
+      const exponent = Math.round(Math.log10(v));
+      return short || Math.abs(v / 10 ** exponent - 1) > 1e-9 ? String(Number(v.toPrecision(3))) : power(exponent);
+    });
+  };
 
   const FONT = "12px system-ui, -apple-system, \"Segoe UI\", Roboto, \"DejaVu Sans\", sans-serif";
   const scale = (axis) => ({
@@ -208,6 +217,7 @@ muslip.Figure = (() => {
     }
     captions(u) {
       const { ctx } = u;
+      const written = [];
       for (const layer of this.spec.layers.filter((l) => l.shape === "marker" && l.caption)) {
         const x = u.valToPos(layer.x[0], "x", true);
         const y = u.valToPos(layer.y[0], "y", true);
@@ -216,6 +226,12 @@ muslip.Figure = (() => {
         ctx.fillStyle = ink(layer.ink);
         ctx.textAlign = right ? "left" : "right";
         ctx.textBaseline = "bottom";
+        const width = ctx.measureText(layer.caption).width;
+        const from = x + (right ? 9 * devicePixelRatio : -9 * devicePixelRatio - width);
+        const box = { from, to: from + width, bottom: y - 5 * devicePixelRatio, top: y - 19 * devicePixelRatio };
+        // Of captions that would lie over one another the first is written; the table has them all.
+        if (written.some((other) => box.from < other.to && other.from < box.to && box.top < other.bottom && other.top < box.bottom)) continue;
+        written.push(box);
         ctx.fillText(layer.caption, x + (right ? 9 : -9) * devicePixelRatio, y - 5 * devicePixelRatio);
       }
     }

@@ -5,7 +5,7 @@ for (const table of document.querySelectorAll("table.sortable")) {
   const heads = [...table.tHead.rows[0].cells];
   const key = (row, column) => {
     const { dataset, textContent } = row.cells[column];
-    const number = Number.parseFloat(dataset.key ?? textContent);
+    const number = Number.parseFloat((dataset.key ?? textContent).replace("\u2212", "-"));
     return Number.isNaN(number) ? textContent : number;
   };
   const compare = (a, b) => (typeof a === "number" && typeof b === "number" ? a - b : String(a).localeCompare(String(b)));

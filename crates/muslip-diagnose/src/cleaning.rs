@@ -72,7 +72,11 @@ pub(crate) fn clean(
             x[k] = f64::NAN;
         }
         if let (Some(&first), Some(&last)) = (spikes.first(), spikes.last()) {
-            report(first, last, format!("{} isolated outliers", spikes.len()));
+            let outliers = match spikes.len() {
+                1 => "1 isolated outlier".to_owned(),
+                many => format!("{many} isolated outliers"),
+            };
+            report(first, last, outliers);
         }
     }
     // Frozen: the very same non-zero value for long, in a channel that otherwise moves.

@@ -19,7 +19,7 @@
 //! | location | [`locate`], `size` |
 //! | how sure, and what was looked for | [`confidence`], [`separating`], [`looked`] |
 //! | what each part is worth | [`ablation`] |
-//! | result and repaired model | [`diagnose`](mod@diagnose), [`outcome`], [`repaired`] |
+//! | result and repaired model | [`diagnose`](mod@diagnose), [`outcome`], [`repaired`], [`imbalance`] |
 //!
 //! It knows no file format and no terminal, and gives the same result whatever the number of threads.
 #![forbid(unsafe_code)]
@@ -38,6 +38,7 @@ pub mod diagnose;
 pub mod dynamics_remainder;
 pub mod dynamics_stage;
 pub mod fit;
+pub mod imbalance;
 pub mod lines;
 pub mod locate;
 pub mod looked;

@@ -326,6 +326,16 @@ impl Repaired {
         }
     }
 
+    /// A run prepared as those that the model was made from.
+    pub(crate) fn prepared(&self, run: &Run) -> Data {
+        let index = self.known(run).unwrap_or(self.recordings.len());
+        let mut extra_names: Vec<String> = run.extra.iter().map(|(name, _)| name.clone()).collect();
+        extra_names.sort();
+        let reach_factor = self.context.reach_factor;
+        let (series, _) = prepare(&self.rig, run, &extra_names, index, reach_factor);
+        self.data_of(series, extra_names)
+    }
+
     /// Predicts the drag reading of a recording from its other columns.
     ///
     /// # Errors
@@ -333,17 +343,7 @@ impl Repaired {
     pub fn predict(&self, run: &Run, which: Which) -> Result<Prediction, RepairedError> {
         let mut blind = run.clone();
         blind.drag_force_n = Vec::new();
-        let index = self.known(run).unwrap_or(self.recordings.len());
-        let mut extra_names: Vec<String> = run.extra.iter().map(|(name, _)| name.clone()).collect();
-        extra_names.sort();
-        let (series, _) = prepare(
-            &self.rig,
-            &blind,
-            &extra_names,
-            index,
-            self.context.reach_factor,
-        );
-        let data = self.data_of(series, extra_names);
+        let data = self.prepared(&blind);
         let model = self.tyre_model(&data.catalogue, which)?;
         let series = &data.series[0];
         let state = tyre(

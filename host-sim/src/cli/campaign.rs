@@ -13,7 +13,7 @@ use super::estimate::{Choices, Job};
 use super::progress::Progress;
 use super::terminal::Terminal;
 use crate::campaign::{Campaign, Run, index, page_names};
-use crate::output::{create_folder, write_file};
+use crate::output::{StagedFolder, write_file};
 use crate::recording::Recording;
 use crate::report::{FigureFormat, write_figures};
 
@@ -45,21 +45,23 @@ pub(super) struct Arguments {
     recordings: Vec<PathBuf>,
 }
 
+/// The page of them all.
+const INDEX: &str = "index.html";
+
 pub(super) fn run(arguments: &Arguments, terminal: &mut Terminal) -> Result<(), Failure> {
     let out = &arguments.out;
-    create_folder(out)?;
-    // Every recording is looked at before the first page is written.
     let mut bytes = 0;
     for recording in &arguments.recordings {
         bytes += 2 * Recording::announced_length_bytes(recording)?;
     }
     let pages = page_names(&arguments.recordings);
+    let staged = StagedFolder::create(out)?;
     let done = AtomicU64::new(0);
     let bar = Mutex::new(Progress::bytes("estimate", bytes));
     let jobs = arguments.recordings.par_iter().zip(&pages);
     let runs: Result<Vec<Run>, Failure> = jobs
         .map(|(recording, page)| {
-            let path = out.join(page);
+            let path = staged.path(page);
             let job = Job {
                 rig_path: &arguments.rig,
                 recording_path: recording,
@@ -87,8 +89,8 @@ pub(super) fn run(arguments: &Arguments, terminal: &mut Terminal) -> Result<(), 
         &arguments.rig.display().to_string(),
         &command(arguments),
     );
-    let path = out.join("index.html");
-    write_file(&path, report.to_html()?.as_bytes())?;
+    write_file(&staged.path(INDEX), report.to_html()?.as_bytes())?;
+    staged.commit(pages.iter().map(String::as_str).chain([INDEX]))?;
     if let Some(format) = arguments.format {
         let figures = report.figures();
         let figures = figures.iter().map(|(name, figure)| (name.clone(), figure));
@@ -113,7 +115,7 @@ pub(super) fn run(arguments: &Arguments, terminal: &mut Terminal) -> Result<(), 
     if campaign.standing_out() > MOST {
         terminal.line(&format!("  and {} more", campaign.standing_out() - MOST))?;
     }
-    terminal.line(&format!("Written: {}", path.display()))
+    terminal.line(&format!("Written: {}", out.join(INDEX).display()))
 }
 
 fn to_json(campaign: &Campaign) -> serde_json::Value {

@@ -101,8 +101,10 @@ fn find_concealed(folder: &Path, terminal: &mut Terminal) -> Result<(), Failure>
     );
     job::write(&found, &diagnosis, &views, &command)?;
     terminal.line("")?;
-    terminal.line("Four recordings of another rig, of other physics than the simulation: one effect was concealed in")?;
-    terminal.line("them. What the simulation leaves out of them:")?;
+    terminal.paragraph(
+        "Four recordings of another rig, of other physics than the simulation: one effect was concealed in them. \
+         What the simulation leaves out of them:",
+    )?;
     terminal.line("")?;
     let summary = summary(&diagnosis, &found, terminal.width(WIDEST_LINE));
     for line in &summary.verdict {

@@ -10,7 +10,7 @@ use super::progress::Progress;
 use super::terminal::Terminal;
 use crate::output::{create_folder, write_file};
 use crate::paper::{
-    CONVERGENCE_PAGE, Paper, PaperOptions, Table, article_markdown, convergence_page, figures,
+    CONVERGENCE_PAGE, Paper, PaperOptions, article_markdown, convergence_page, figures,
     report_page, reproduce, work,
 };
 use crate::report::{FigureFormat, write_figures};
@@ -89,18 +89,11 @@ fn write_all(paper: &Paper, folder: &Path, format: FigureFormat) -> Result<Vec<P
 
 fn tell(paper: &Paper, terminal: &mut Terminal) -> Result<(), Failure> {
     terminal.headline("The article's statements beside ours")?;
-    lines(&paper.statements_table(), terminal)?;
+    terminal.wide_table(&paper.statements_table())?;
     terminal.headline(
         "Errors against the Cramér-Rao bound (in brackets: standard error of the last digits)",
     )?;
-    lines(&paper.yardstick_table(), terminal)?;
+    terminal.wide_table(&paper.yardstick_table())?;
     terminal.paragraph(&paper.missing_estimates())?;
-    terminal.line("")
-}
-
-fn lines(table: &Table, terminal: &mut Terminal) -> Result<(), Failure> {
-    for line in table.lines() {
-        terminal.line(&line)?;
-    }
     terminal.line("")
 }

@@ -9,7 +9,6 @@ use super::Failure;
 use super::progress::Progress;
 use super::terminal::Terminal;
 use crate::output::{create_folder, write_file};
-use crate::paper::Table;
 use crate::quarter_car::{
     SetupError, Study, StudyOptions, figures, markdown, report_page, study, work,
 };
@@ -117,15 +116,8 @@ fn tell(study: &Study, terminal: &mut Terminal) -> Result<(), Failure> {
         ("What five samples tell", study.observability_table()),
     ] {
         terminal.headline(heading)?;
-        lines(&table, terminal)?;
+        terminal.wide_table(&table)?;
     }
-    terminal.line(&study.foreign_verdict())?;
+    terminal.paragraph(&study.foreign_verdict())?;
     terminal.verdict(&study.verdict(), study.keeps_all())
-}
-
-fn lines(table: &Table, terminal: &mut Terminal) -> Result<(), Failure> {
-    for line in table.lines() {
-        terminal.line(&line)?;
-    }
-    terminal.line("")
 }

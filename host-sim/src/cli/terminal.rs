@@ -5,6 +5,7 @@ use std::io::{self, IsTerminal, Write};
 use clap::builder::styling::{AnsiColor, Style};
 
 use super::Failure;
+use crate::text::{Table, wrapped};
 
 /// Widest line of running text.
 const WIDEST_LINE: usize = 84;
@@ -14,16 +15,21 @@ const NARROWEST: usize = 40;
 /// Standard output. Colours and bold only where it is a terminal and `NO_COLOR` does not forbid them.
 pub(super) struct Terminal {
     out: anstream::AutoStream<io::Stdout>,
-    /// Columns of the terminal; `None` in a pipe or a file.
+    /// Columns of the terminal, or as many as `COLUMNS` says; `None` in a pipe or a file otherwise.
     columns: Option<usize>,
 }
 
 impl Terminal {
     pub(super) fn new() -> Self {
+        let told = std::env::var("COLUMNS").ok();
+        let told = told.and_then(|columns| columns.parse().ok());
+        let columns: Option<usize> = told.filter(|columns| *columns > 0).or_else(|| {
+            let (columns, _) = terminal_size::terminal_size_of(io::stdout())?;
+            Some(usize::from(columns.0))
+        });
         Self {
             out: anstream::AutoStream::auto(io::stdout()),
-            columns: terminal_size::terminal_size_of(io::stdout())
-                .map(|(columns, _)| usize::from(columns.0).max(NARROWEST)),
+            columns: columns.map(|columns| columns.max(NARROWEST)),
         }
     }
 
@@ -37,21 +43,27 @@ impl Terminal {
         writeln!(self.out, "{text}").map_err(Failure::Terminal)
     }
 
-    /// Prints the answer: a line in bold.
+    /// Prints the answer: in bold.
     pub(super) fn headline(&mut self, text: &str) -> Result<(), Failure> {
-        let bold = Style::new().bold();
-        writeln!(self.out, "{bold}{text}{bold:#}").map_err(Failure::Terminal)
+        self.styled(text, Style::new().bold())
     }
 
-    /// Prints a verdict: a line in bold, and in the colour of what it means.
+    /// Prints a verdict: in bold, and in the colour of what it means.
     pub(super) fn verdict(&mut self, text: &str, good: bool) -> Result<(), Failure> {
         let color = if good {
             AnsiColor::Green
         } else {
             AnsiColor::Yellow
         };
-        let style = Style::new().bold().fg_color(Some(color.into()));
-        writeln!(self.out, "{style}{text}{style:#}").map_err(Failure::Terminal)
+        self.styled(text, Style::new().bold().fg_color(Some(color.into())))
+    }
+
+    /// Prints text in a style: in a pipe a line.
+    fn styled(&mut self, text: &str, style: Style) -> Result<(), Failure> {
+        for line in wrapped(text, self.columns.unwrap_or(usize::MAX)) {
+            writeln!(self.out, "{style}{line}{style:#}").map_err(Failure::Terminal)?;
+        }
+        Ok(())
     }
 
     /// Prints running text, wrapped.
@@ -82,6 +94,14 @@ impl Terminal {
         Ok(())
     }
 
+    /// Prints a table of many columns, and an empty line.
+    pub(super) fn wide_table(&mut self, table: &Table) -> Result<(), Failure> {
+        for line in table.lines(self.columns) {
+            self.line(&line)?;
+        }
+        self.line("")
+    }
+
     /// Prints JSON and nothing else.
     pub(super) fn json(&mut self, value: &serde_json::Value) -> Result<(), Failure> {
         self.line(&format!("{value:#}"))
@@ -104,32 +124,4 @@ pub(super) fn complain(line: &str) {
 /// True where a progress bar would be seen and not be in the way.
 pub(super) fn shows_progress() -> bool {
     io::stderr().is_terminal()
-}
-
-fn wrapped(text: &str, width: usize) -> Vec<String> {
-    let mut lines = vec![String::new()];
-    for word in text.split_whitespace() {
-        let Some(line) = lines.last_mut() else { break };
-        if !line.is_empty() && line.chars().count() + 1 + word.chars().count() > width {
-            lines.push(word.to_owned());
-        } else {
-            if !line.is_empty() {
-                line.push(' ');
-            }
-            line.push_str(word);
-        }
-    }
-    lines
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn text_is_wrapped_between_words() {
-        assert_eq!(wrapped("aa bb cc", 5), ["aa bb", "cc"]);
-        assert_eq!(wrapped("aaaaaaaa b", 5), ["aaaaaaaa", "b"]);
-        assert_eq!(wrapped("", 5), [""]);
-    }
 }

@@ -1,5 +1,6 @@
 //! `muslip diagnose` and `muslip predict`: files in, engine, files out.
 
+pub mod effects;
 pub mod job;
 pub mod json;
 pub mod load;

@@ -1,9 +1,10 @@
 //! The report of a diagnosis: `report.html`.
 
 use muslip_diagnose::mechanism::Id;
-use muslip_diagnose::outcome::{Diagnosis, Interval, NamedMechanism, Role, Verdict};
+use muslip_diagnose::outcome::{
+    Diagnosis, Interval, MinimumDetectable, NamedMechanism, Role, Verdict,
+};
 
-use super::plots;
 use super::proof::proof;
 use super::views::Views;
 use super::wording::{
@@ -11,6 +12,7 @@ use super::wording::{
     quantity_apart, range, short_name, sigmas, significant, spoken, stretch, unexplained_sentence,
     unseen, variable, verdict_sentence, with_unit,
 };
+use super::{effects, plots};
 use crate::report::{Block, KeyFigure, Report, Section, Table, Tone};
 
 /// Most rows of the tables that grow with the recordings.
@@ -132,7 +134,13 @@ fn findings(diagnosis: &Diagnosis, views: &Views) -> Section {
     for mechanism in &diagnosis.mechanisms {
         blocks.push(Block::Paragraph(mechanism_sentence(mechanism)));
         blocks.push(mechanism_table(mechanism));
-        blocks.extend(views.effect(mechanism.id).map(Block::Figure));
+        blocks.extend(
+            views
+                .effect(mechanism.id)
+                .iter()
+                .cloned()
+                .map(Block::Figure),
+        );
     }
     for rest in &diagnosis.unexplained {
         blocks.push(Block::Paragraph(unexplained_sentence(rest)));
@@ -147,6 +155,7 @@ fn findings(diagnosis: &Diagnosis, views: &Views) -> Section {
                 variable(&correction.variable),
                 range(&correction.variable, *low, *high),
             )));
+            blocks.extend(effects::correction(correction).map(Block::Figure));
         }
     }
     if blocks.is_empty() {
@@ -247,7 +256,7 @@ fn places(diagnosis: &Diagnosis, views: &Views) -> Section {
     }
     if !diagnosis.r#where.is_empty() {
         let shown = strongest(&diagnosis.r#where);
-        let rows = shown
+        let rows: Vec<[String; 5]> = shown
             .iter()
             .map(|interval| {
                 [
@@ -266,10 +275,10 @@ fn places(diagnosis: &Diagnosis, views: &Views) -> Section {
                 diagnosis.r#where.len()
             )));
         }
-        blocks.push(table(
-            ["recording", "balance", "channel", "time", "sigma"],
-            rows,
-        ));
+        blocks.push(Block::Folded {
+            summary: "Flagged stretches as a table".into(),
+            table: Table::new(["recording", "balance", "channel", "time", "sigma"], rows),
+        });
     }
     section("Where", blocks)
 }
@@ -283,6 +292,23 @@ fn strongest(intervals: &[Interval]) -> Vec<&Interval> {
     order.into_iter().map(|index| &intervals[index]).collect()
 }
 
+/// The smallest effect that would have been seen, under its name.
+fn smallest(effect: &MinimumDetectable) -> String {
+    // A phase and a place are searched by parameters that have no name of their own.
+    let numbered = |stem: &str| {
+        let rest = effect.name.strip_prefix(stem);
+        rest.is_some_and(|rest| rest.starts_with(|letter: char| letter.is_ascii_digit()))
+    };
+    let name = if numbered("cos") || numbered("sin") {
+        "amplitude".to_owned()
+    } else if numbered("change") {
+        "change of friction".to_owned()
+    } else {
+        spoken(&effect.name)
+    };
+    format!("{name} {}", least(effect))
+}
+
 fn looked_for(diagnosis: &Diagnosis) -> Section {
     let (hidden, visible) = unseen(diagnosis);
     let what = |id: &str| Id::parse(id).map_or("", Id::what).to_owned();
@@ -294,9 +320,7 @@ fn looked_for(diagnosis: &Diagnosis) -> Section {
             .any(|named| named.id == entry.id)
         {
             let effect = entry.minimum_detectable.as_ref();
-            let effect = effect.map_or(String::new(), |m| {
-                format!("{} {}", spoken(&m.name), least(m))
-            });
+            let effect = effect.map_or(String::new(), smallest);
             rows.push([spoken(entry.id), what(entry.id), "found".to_owned(), effect]);
         }
     }
@@ -305,7 +329,7 @@ fn looked_for(diagnosis: &Diagnosis) -> Section {
             spoken(entry.id),
             what(entry.id),
             format!("not{NO_BREAK}found"),
-            format!("{} {}", spoken(&effect.name), least(effect)),
+            smallest(effect),
         ]
     }));
     let unmeasured = diagnosis.looked_for.iter().filter(|entry| {

@@ -5,11 +5,12 @@ use std::path::Path;
 use muslip_diagnose::outcome::{Diagnosis, Interval, Verdict};
 
 use crate::input_error::one_line;
+use crate::text::wrapped;
 
 use super::wording::{
-    NO_BREAK, capitalised, confusable_sentence, either, gain, least, mechanism_sentence, percent,
-    range, short_name, sigmas, significant, spoken, stretch, unexplained_sentence, unseen,
-    variable, verdict_sentence, with_unit,
+    capitalised, confusable_sentence, either, gain, least, mechanism_sentence, percent, range,
+    short_name, sigmas, significant, spoken, stretch, unexplained_sentence, unseen, variable,
+    verdict_sentence, with_unit,
 };
 
 /// Most lines of a summary.
@@ -35,7 +36,7 @@ pub struct Summary {
 /// the folder of its files, whose own line is as long as it must be.
 #[must_use]
 pub fn summary(diagnosis: &Diagnosis, out: &Path, width: usize) -> Summary {
-    let mut verdict = wrapped(&one_line(&verdict_sentence(diagnosis)), width);
+    let mut verdict = broken(&one_line(&verdict_sentence(diagnosis)), width);
     // A narrow terminal needs more lines for the same words.
     let verdict_lines = if width < WIDEST_LINE { 4 } else { 2 };
     cut(&mut verdict, verdict_lines, width);
@@ -86,7 +87,7 @@ impl Part {
         let body: Vec<String> = texts
             .iter()
             // Headers and paths come from outside: nothing in them may steer the terminal.
-            .flat_map(|text| wrapped(&one_line(text), width - LABEL))
+            .flat_map(|text| broken(&one_line(text), width - LABEL))
             .collect();
         let most = most.min(body.len());
         Self {
@@ -284,26 +285,15 @@ fn cut(lines: &mut Vec<String>, most: usize, width: usize) {
     }
 }
 
-/// Lines of at most `width` characters, broken between words and never between a number and its unit; a
-/// longer word is cut.
-fn wrapped(text: &str, width: usize) -> Vec<String> {
-    let mut lines: Vec<String> = Vec::new();
-    for word in text.split(' ').filter(|word| !word.is_empty()) {
-        let mut word = word.replace(NO_BREAK, " ");
-        if word.chars().count() > width {
-            word = word
-                .chars()
-                .take(width.saturating_sub(3))
-                .collect::<String>()
-                + "...";
-        }
-        match lines.last_mut() {
-            Some(line) if line.chars().count() + 1 + word.chars().count() <= width => {
-                line.push(' ');
-                line.push_str(&word);
-            }
-            _ => lines.push(word),
+/// Lines of at most `width` characters, whatever it takes: a longer word is cut.
+fn broken(text: &str, width: usize) -> Vec<String> {
+    let mut lines = wrapped(text, width);
+    for line in &mut lines {
+        if line.chars().count() > width {
+            let kept = line.chars().take(width.saturating_sub(3));
+            *line = kept.collect::<String>() + "...";
         }
     }
+    lines.retain(|line| !line.is_empty());
     lines
 }

@@ -8,21 +8,14 @@ use std::collections::BTreeMap;
 
 use muslip_diagnose::campaign::Run;
 use muslip_diagnose::outcome::{Diagnosis, Trace};
-use muslip_diagnose::repaired::{Repaired, Which};
 
-use super::wording::{short_name, spoken};
+use super::effects::{Effect, effects};
 use crate::report::{Axis, Cells, Figure, Ink, Shape};
 
 /// Rows of all recordings together that are kept for pictures of effects.
 const MOST_ROWS: usize = 300_000;
 /// Speeds that are kept of a recording.
 const MOST_SPEEDS: usize = 4000;
-/// Shortest stretch shown of an effect, in s, ...
-const SHORTEST_STRETCH_S: f64 = 0.6;
-/// ... and longest.
-const LONGEST_STRETCH_S: f64 = 4.0;
-/// Most points of a line.
-const MOST_POINTS: usize = 1200;
 /// Columns and rows of the map over slip and speed.
 const MAP: (usize, usize) = (16, 10);
 /// Columns of the map over time.
@@ -70,17 +63,6 @@ pub struct Views {
     effects: Vec<Effect>,
 }
 
-/// The drag about a stretch, with and without one mechanism.
-#[derive(Debug, Clone)]
-struct Effect {
-    id: String,
-    recording: String,
-    time_s: Vec<f64>,
-    measured_n: Vec<f64>,
-    with_n: Vec<f64>,
-    without_n: Vec<f64>,
-}
-
 impl Views {
     /// What the page of this diagnosis shows of its recordings.
     #[must_use]
@@ -94,48 +76,15 @@ impl Views {
                 Some((trace.recording.clone(), speeds.collect()))
             })
             .collect();
-        let effects = diagnosis
-            .repaired
-            .tyre
-            .iter()
-            .enumerate()
-            .filter_map(|(index, term)| effect(diagnosis, &kept.runs, index, &term.id))
-            .collect();
+        let effects = effects(diagnosis, &kept.runs);
         Self { speeds, effects }
     }
 
-    /// The picture of a mechanism's effect, where there is one.
+    /// The pictures of a mechanism's effect, where there are any.
     #[must_use]
-    pub fn effect(&self, id: &str) -> Option<Figure> {
-        let effect = self.effects.iter().find(|effect| effect.id == id)?;
-        let line = |values: &[f64]| {
-            let points = effect.time_s.iter().copied().zip(values.iter().copied());
-            points.collect::<Vec<_>>()
-        };
-        let figure = Figure::new(
-            format!(
-                "What {} does: the repaired model with and without it, about the stretch of {} that shows it most.",
-                spoken(id),
-                short_name(&effect.recording)
-            ),
-            Axis::new("time (s)"),
-            Axis::new("drag (N)"),
-        );
-        Some(
-            figure
-                .named(format!("effect-{id}"))
-                .with(
-                    Ink::Measured,
-                    "measured",
-                    Shape::Points(line(&effect.measured_n)),
-                )
-                .with(
-                    Ink::Second,
-                    "without it",
-                    Shape::Dashes(line(&effect.without_n)),
-                )
-                .with(Ink::Estimate, "with it", Shape::Line(line(&effect.with_n))),
-        )
+    pub fn effect(&self, id: &str) -> &[Figure] {
+        let effect = self.effects.iter().find(|effect| effect.id == id);
+        effect.map_or(&[], |effect| &effect.figures)
     }
 
     /// Mean residuals over slip and speed, before and after the repair, in the same colours.
@@ -228,47 +177,6 @@ fn residuals(trace: &Trace) -> impl Iterator<Item = (f64, f64)> + '_ {
         .iter()
         .zip(models)
         .map(|(measured, (before, after))| (measured - before, measured - after))
-}
-
-/// Runs the repaired model over the stretch that shows a mechanism most, with and without it.
-fn effect(diagnosis: &Diagnosis, runs: &[Run], index: usize, id: &str) -> Option<Effect> {
-    let repaired = &diagnosis.repaired;
-    let mut without = Repaired {
-        corrections: Vec::new(),
-        ..repaired.clone()
-    };
-    let with = without.clone();
-    without.tyre.remove(index);
-    let shown = diagnosis
-        .r#where
-        .iter()
-        .filter(|interval| interval.balance == "tyre")
-        .filter_map(|interval| {
-            let run = runs.iter().find(|run| run.name == interval.recording)?;
-            Some((interval, run))
-        })
-        .max_by(|a, b| a.0.z.total_cmp(&b.0.z));
-    let (interval, run) = shown?;
-    let drag = |model: &Repaired| Some(model.predict(run, Which::Repaired).ok()?.drag_force_n);
-    let (with_n, without_n) = (drag(&with)?, drag(&without)?);
-    let middle = 0.5 * (interval.start_s + interval.end_s);
-    let length =
-        (1.5 * (interval.end_s - interval.start_s)).clamp(SHORTEST_STRETCH_S, LONGEST_STRETCH_S);
-    let from = run.time_s.partition_point(|t| *t < middle - 0.5 * length);
-    let to = run.time_s.partition_point(|t| *t <= middle + 0.5 * length);
-    let stride = to.saturating_sub(from).div_ceil(MOST_POINTS).max(1);
-    let taken = |values: &[f64]| -> Vec<f64> {
-        let stretch = values.get(from..to).unwrap_or_default();
-        stretch.iter().step_by(stride).copied().collect()
-    };
-    Some(Effect {
-        id: id.to_owned(),
-        recording: run.name.clone(),
-        time_s: taken(&run.time_s),
-        measured_n: taken(&run.drag_force_n),
-        with_n: taken(&with_n),
-        without_n: taken(&without_n),
-    })
 }
 
 /// A residual in N and where it stands on a map.

@@ -128,6 +128,15 @@ pub fn variable(name: &str) -> String {
     named(name).0.to_owned()
 }
 
+/// A variable with its unit, as an axis has it.
+#[must_use]
+pub fn axis_label(variable: &str) -> String {
+    match named(variable) {
+        (name, "") => name.to_owned(),
+        (name, unit) => format!("{name} ({unit})"),
+    }
+}
+
 /// A range of a variable with its unit.
 #[must_use]
 pub fn range(variable: &str, low: f64, high: f64) -> String {

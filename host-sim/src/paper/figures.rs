@@ -347,7 +347,7 @@ fn with_ellipses(figure: Figure, steps: &[Step], shown: &[usize], named: &[usize
         let label = if index == last {
             "after the last"
         } else if Some(&index) == shown.first() {
-            "before it"
+            "before the last"
         } else {
             ""
         };

@@ -36,7 +36,6 @@ pub use pass::{PassError, Step, first_start, second_start, traced};
 pub use statement::{Ours, Statement, Verdict};
 pub use statistics::Band;
 pub use stream::{FRICTION_STD, POINTS, TRUTH, frictions, slips};
-pub use table::Table;
 pub use yardstick::{Accuracy, Cell, Contender, Errors};
 
 /// How much is computed.

@@ -3,9 +3,9 @@
 use super::figures::{Part, convergence, figures};
 use super::pass::PassError;
 use super::statement::Verdict;
-use super::table::Table;
 use super::{Paper, PaperOptions};
 use crate::report::{Block, KeyFigure, Report, Section, Tone};
+use crate::text::Table;
 
 /// Name of the page with the animation, beside the report.
 pub const CONVERGENCE_PAGE: &str = "convergence.html";

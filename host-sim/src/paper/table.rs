@@ -7,54 +7,7 @@ use super::statistics::Band;
 use super::yardstick::{Accuracy, Cell, Contender};
 use super::{Paper, PaperOptions};
 use crate::estimate::range_word;
-
-/// A table of text.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Table {
-    /// Heads of the columns.
-    pub head: Vec<String>,
-    /// Rows, each as long as the head.
-    pub rows: Vec<Vec<String>>,
-}
-
-impl Table {
-    /// Lines with columns aligned: the first, and any that hold no figures, to the left.
-    pub fn lines(&self) -> Vec<String> {
-        let all = || std::iter::once(&self.head).chain(&self.rows);
-        let widths: Vec<usize> = (0..self.head.len())
-            .map(|column| {
-                all()
-                    .filter_map(|row| row.get(column))
-                    .map(|cell| cell.chars().count())
-                    .max()
-                    .unwrap_or(0)
-            })
-            .collect();
-        let aligned = |row: &Vec<String>| {
-            let cells: Vec<String> = row
-                .iter()
-                .zip(&widths)
-                .map(|(cell, &width)| format!("{cell:width$}"))
-                .collect();
-            cells.join("  ").trim_end().to_owned()
-        };
-        let rule = "-".repeat(widths.iter().sum::<usize>() + 2 * widths.len().saturating_sub(1));
-        let mut lines = vec![aligned(&self.head), rule];
-        lines.extend(self.rows.iter().map(aligned));
-        lines
-    }
-
-    /// As Markdown.
-    pub fn markdown(&self) -> String {
-        let row = |cells: &[String]| {
-            let cells: Vec<String> = cells.iter().map(|cell| cell.replace('|', "\\|")).collect();
-            format!("| {} |\n", cells.join(" | "))
-        };
-        let rule = format!("|{}\n", " --- |".repeat(self.head.len()));
-        let body: String = self.rows.iter().map(|cells| row(cells)).collect();
-        row(&self.head) + &rule + &body
-    }
-}
+use crate::text::Table;
 
 fn joined(peak: [String; 3], slip: [String; 3]) -> [String; 6] {
     let ([a, b, c], [d, e, f]) = (peak, slip);
@@ -290,22 +243,4 @@ fn cell_json(cell: &Cell) -> Value {
         "start": range_word(cell.range),
         "estimators": estimators,
     })
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn columns_line_up_and_bars_do_not_break_markdown() {
-        let table = Table {
-            head: owned(["a", "bb"]),
-            rows: vec![owned(["|x|", "é"]), owned(["1", "2"])],
-        };
-        assert_eq!(table.lines(), ["a    bb", "-------", "|x|  é", "1    2"]);
-        assert_eq!(
-            table.markdown(),
-            "| a | bb |\n| --- | --- |\n| \\|x\\| | é |\n| 1 | 2 |\n"
-        );
-    }
 }

@@ -7,8 +7,8 @@ use super::scenario::FOREIGN_RELAXATION_M;
 use super::study::Study;
 use super::surface::Surface;
 use super::who::Who;
-use crate::paper::Table;
 use crate::report::{Block, KeyFigure, Report, Section, Tone};
+use crate::text::Table;
 
 const TITLE: &str = "Slip control of a braked quarter car";
 const SUBJECT: &str = "after P. Goddard, Using an Extended Kalman Filter for Estimating Vehicle \
@@ -154,10 +154,14 @@ type Part = (&'static str, Vec<String>, Table);
 
 /// All parts, for the report and the page alike.
 fn parts(study: &Study) -> Result<Vec<Part>, SetupError> {
+    let median = study.mistaken.median;
+    let stops = if median.is_finite() {
+        format!("stops in {median:.2} times the distance (median)")
+    } else {
+        "does not stop (median)".to_owned()
+    };
     let mistaken = format!(
-        "A tuned filter that believes wet on a dry road stops in {:.2} times the distance (median), which is \
-         why (f) needs more.",
-        study.mistaken.median
+        "A tuned filter that believes wet on a dry road {stops}, which is why (f) needs more."
     );
     let one = |text: &str| vec![words(text)];
     Ok(vec![

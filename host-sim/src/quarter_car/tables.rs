@@ -5,7 +5,7 @@ use serde_json::{Value, json};
 use super::drivers::Channels;
 use super::rows::{LOCK_BAR_S, Ratios, Row};
 use super::study::{Reference, Study};
-use crate::paper::Table;
+use crate::text::Table;
 
 fn ratio(value: f64) -> String {
     if value.is_finite() {

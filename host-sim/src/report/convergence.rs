@@ -94,7 +94,7 @@ pub struct Convergence {
     pub truth: Option<CurveLabel>,
     /// Which filter ran; `None` where the page cannot run it again.
     pub again: Option<EstimatorKind>,
-    /// What the reader is told about running it again.
+    /// What the reader is told about running it again, or about why not.
     pub about_what_if: String,
 }
 
@@ -283,6 +283,18 @@ impl Convergence {
     /// The core to run again with, where the page can.
     pub(super) fn core(&self) -> Option<&'static str> {
         (self.again.is_some() && !CORE.is_empty()).then_some(CORE)
+    }
+
+    /// What to say where the page cannot run the filter again.
+    pub(super) fn without_what_if(&self) -> Option<&str> {
+        match (self.again, CORE.is_empty()) {
+            (None, _) => Some(&self.about_what_if),
+            (Some(_), true) => Some(
+                "This page cannot run the filter again under other assumptions: the command that made it was \
+                 built without the target wasm32-unknown-unknown.",
+            ),
+            (Some(_), false) => None,
+        }
     }
 
     /// The page's data.

@@ -113,7 +113,7 @@ fn convergence(result: &EstimateResult, beside: Option<&CurveLabel>) -> Converge
     let record = &result.record;
     let thinned = if record.stride > 1 {
         format!(
-            " Every {}. of {} measurements is in the page, so that its own run differs a little from the \
+            " One in {} of {} measurements is in the page, so that its own run differs a little from the \
              command's.",
             record.stride, result.used
         )
@@ -129,10 +129,16 @@ fn convergence(result: &EstimateResult, beside: Option<&CurveLabel>) -> Converge
         truth: beside.cloned(),
         // What a compensated reading is expected to be depends on the filter's state, sample by sample.
         again: result.model.is_none().then_some(result.estimator),
-        about_what_if: format!(
-            "Change what the filter assumes and it runs again, here in the page: the same code that runs on the \
-             rig.{thinned}"
-        ),
+        about_what_if: match result.model {
+            None => format!(
+                "Change what the filter assumes and it runs again, here in the page: the same code that runs on \
+                 the rig.{thinned}"
+            ),
+            Some(_) => "There is no what-if on this page: a repaired model compensates every reading by the state \
+                        of the filter at that moment, so that other assumptions need the recording itself. Run \
+                        the command again with another --range or --estimator."
+                .to_owned(),
+        },
     }
 }
 

@@ -201,7 +201,14 @@ impl Figure {
         for layer in &self.layers {
             layer.shape.spread(&mut along, &mut up);
         }
-        (along.range(&self.x, 0.0), up.range(&self.y, 0.06))
+        // A dot at the end of an axis shows as a whole; a line ends where the axis does.
+        let dots = |layer: &Layer| matches!(layer.shape, Shape::Points(_) | Shape::Marker(..));
+        let margin = if self.layers.iter().any(dots) {
+            0.015
+        } else {
+            0.0
+        };
+        (along.range(&self.x, margin), up.range(&self.y, 0.06))
     }
 }
 

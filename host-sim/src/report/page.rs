@@ -10,7 +10,7 @@ use super::convergence::Convergence;
 use super::figure::{Figure, Shape};
 use super::spec::{alternative, ink_word, of_figure, shape_word, short};
 use super::svg::DrawError;
-use super::table::Table;
+use super::table::{Table, typeset};
 
 /// How a verdict is meant, which is its colour on the page.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -138,7 +138,7 @@ struct DrawnSection<'a> {
 
 enum DrawnBlock<'a> {
     Heading(&'a str),
-    Paragraph(&'a str),
+    Paragraph(String),
     Table(DrawnTable<'a>),
     Folded {
         summary: &'a str,
@@ -178,6 +178,8 @@ struct Player<'a> {
     figures: Vec<DrawnFigure>,
     last: usize,
     what_if: Option<WhatIf<'a>>,
+    /// Why there is none.
+    without: Option<&'a str>,
 }
 
 struct WhatIf<'a> {
@@ -202,7 +204,10 @@ impl PageData {
         let layers = figure.layers.iter();
         DrawnFigure {
             id,
-            figure: figure.clone(),
+            figure: Figure {
+                caption: typeset(&figure.caption),
+                ..figure.clone()
+            },
             legend: layers
                 .clone()
                 .filter(|layer| !layer.label.is_empty() && !matches!(layer.shape, Shape::Cells(_)))
@@ -246,6 +251,7 @@ impl PageData {
             figures,
             last: convergence.frames.len().saturating_sub(1),
             what_if,
+            without: convergence.without_what_if(),
         }
     }
 
@@ -330,8 +336,7 @@ impl Report {
         let scripts = data.scripts();
         let page = Page {
             report: self,
-            // A value and its uncertainty stay on one line.
-            verdict: self.verdict.replace(" \u{b1} ", "\u{a0}\u{b1}\u{a0}"),
+            verdict: typeset(&self.verdict),
             tone: match self.tone {
                 Tone::Good => "good",
                 Tone::Neutral => "neutral",
@@ -354,7 +359,7 @@ fn drawn<'a>(section: &'a Section, data: &mut PageData) -> DrawnSection<'a> {
     for block in &section.blocks {
         let next = match block {
             Block::Heading(text) => DrawnBlock::Heading(text),
-            Block::Paragraph(text) => DrawnBlock::Paragraph(text),
+            Block::Paragraph(text) => DrawnBlock::Paragraph(typeset(text)),
             Block::Table(table) => DrawnBlock::Table(data.table(heading, table)),
             Block::Folded { summary, table } => DrawnBlock::Folded {
                 summary,

@@ -51,11 +51,65 @@ impl Table {
     }
 }
 
+impl Cell {
+    /// Most characters of a cell that stays on one line.
+    const SHORT: usize = 20;
+
+    /// Whether it is a word or a figure rather than a sentence.
+    pub(super) fn is_short(&self) -> bool {
+        self.text.chars().count() <= Self::SHORT
+    }
+
+    /// The text with the signs of print.
+    pub(super) fn shown(&self) -> String {
+        typeset(&self.text)
+    }
+}
+
+/// With the minus sign of print before numbers, and numbers on one line with what belongs to them.
+pub(super) fn typeset(text: &str) -> String {
+    let mut set = String::with_capacity(text.len());
+    let mut before = ' ';
+    let mut rest = text.chars().peekable();
+    while let Some(letter) = rest.next() {
+        let next = rest.peek().copied().unwrap_or(' ');
+        let set_letter = match letter {
+            '-' if matches!(before, ' ' | '(' | '\u{a0}') && next.is_ascii_digit() => '\u{2212}',
+            ' ' if matches!(next, '%' | '\u{b1}') || before == '\u{b1}' => '\u{a0}',
+            other => other,
+        };
+        set.push(set_letter);
+        before = letter;
+    }
+    set
+}
+
 impl From<String> for Cell {
     fn from(text: String) -> Self {
         Self {
             text,
             ..Self::default()
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::typeset;
+
+    #[test]
+    fn numbers_are_set_as_in_print_and_names_are_left_alone() {
+        assert_eq!(
+            typeset("-0.5 to -3 (-1)"),
+            "\u{2212}0.5 to \u{2212}3 (\u{2212}1)"
+        );
+        assert_eq!(
+            typeset("run-1.csv --seed 1, a - b"),
+            "run-1.csv --seed 1, a - b"
+        );
+        assert_eq!(
+            typeset("1 \u{b1} 2, 95 % of"),
+            "1\u{a0}\u{b1}\u{a0}2, 95\u{a0}% of"
+        );
     }
 }

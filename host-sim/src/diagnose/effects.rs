@@ -1,0 +1,386 @@
+//! Pictures of what each mechanism of a repaired model does, made from recordings.
+
+use muslip_diagnose::campaign::Run;
+use muslip_diagnose::imbalance::{Against, Imbalance, Instant};
+use muslip_diagnose::mechanism::{Balance, Id};
+use muslip_diagnose::outcome::Diagnosis;
+use muslip_diagnose::repaired::{Correction, Repaired, Which};
+
+use super::wording::{axis_label, short_name, spoken};
+use crate::report::{Axis, Figure, Ink, Shape};
+
+/// Length of the stretch about which a drag is shown, in s.
+const STRETCH_S: f64 = 0.8;
+/// Fewest samples of it.
+const FEWEST_SAMPLES: usize = 60;
+/// Most points of a line.
+const MOST_POINTS: usize = 1200;
+/// Length over which an acceleration is taken, in s: over one sample it would be all noise.
+const MEAN_S: f64 = 0.05;
+/// Means of a stretch that is shown against time.
+const MEANS: f64 = 80.0;
+/// Ranges of what an effect is a function of, and fewest means of one that is shown.
+const RANGES: usize = 24;
+const FEWEST_MEANS: usize = 3;
+
+/// A mechanism's pictures.
+#[derive(Debug, Clone)]
+pub struct Effect {
+    /// The mechanism's id.
+    pub id: String,
+    /// What it does.
+    pub figures: Vec<Figure>,
+}
+
+/// The pictures of every mechanism of a diagnosis that the recordings kept can show.
+#[must_use]
+pub fn effects(diagnosis: &Diagnosis, runs: &[Run]) -> Vec<Effect> {
+    let repaired = &diagnosis.repaired;
+    let tyre = repaired.tyre.iter().enumerate().map(|(place, term)| {
+        let run = strongest(diagnosis, runs, "tyre");
+        let figures = run.and_then(|run| on_drag(repaired, run, place));
+        (&term.id, figures.unwrap_or_default())
+    });
+    let dynamics = repaired.dynamics.iter().enumerate().map(|(place, term)| {
+        let figures = on_balance(diagnosis, runs, place, &term.id).into_iter();
+        (&term.id, figures.collect())
+    });
+    tyre.chain(dynamics)
+        .map(|(id, figures)| Effect {
+            id: id.clone(),
+            figures,
+        })
+        .collect()
+}
+
+/// The run with the strongest mismatch in a balance; the first where none is flagged.
+fn strongest<'a>(diagnosis: &Diagnosis, runs: &'a [Run], balance: &str) -> Option<&'a Run> {
+    let flagged = diagnosis.r#where.iter().filter(|i| i.balance == balance);
+    flagged
+        .filter_map(|interval| {
+            let run = runs.iter().find(|run| run.name == interval.recording)?;
+            Some((interval.z, run))
+        })
+        .max_by(|a, b| a.0.total_cmp(&b.0))
+        .map(|(_, run)| run)
+        .or_else(|| runs.first())
+}
+
+/// What a mechanism of the tyre balance does to the drag: the stretch that shows it most, and the whole run.
+fn on_drag(repaired: &Repaired, run: &Run, place: usize) -> Option<Vec<Figure>> {
+    let with = Repaired {
+        corrections: Vec::new(),
+        ..repaired.clone()
+    };
+    let mut without = with.clone();
+    let id = without.tyre.remove(place).id;
+    let drag = |model: &Repaired| Some(model.predict(run, Which::Repaired).ok()?.drag_force_n);
+    let (with_n, without_n) = (drag(&with)?, drag(&without)?);
+    let difference: Vec<f64> = with_n.iter().zip(&without_n).map(|(a, b)| a - b).collect();
+    let (from, to) = most_shown(&run.time_s, &difference);
+    let line = |values: &[f64], (from, to): (usize, usize)| -> Vec<(f64, f64)> {
+        let stride = (to - from).div_ceil(MOST_POINTS).max(1);
+        let points = run.time_s.iter().copied().zip(values.iter().copied());
+        points.take(to).skip(from).step_by(stride).collect()
+    };
+    let (name, recording) = (spoken(&id), short_name(&run.name));
+    let close_up = Figure::new(
+        format!("The drag with {name} and without it, where {recording} shows it most."),
+        Axis::new("time (s)"),
+        Axis::new("drag (N)"),
+    )
+    .named(format!("effect-{id}"))
+    .with(
+        Ink::Measured,
+        "measured",
+        Shape::Points(line(&run.drag_force_n, (from, to))),
+    )
+    .with(
+        Ink::Second,
+        "model without it",
+        Shape::Dashes(line(&without_n, (from, to))),
+    )
+    .with(
+        Ink::Estimate,
+        "model with it",
+        Shape::Line(line(&with_n, (from, to))),
+    );
+    let whole = Figure::new(
+        format!("What {name} adds to the drag over all of {recording}: with it less without it."),
+        Axis::new("time (s)"),
+        Axis::new("difference of drag (N)"),
+    )
+    .named(format!("effect-{id}-over-time"))
+    .with(Ink::Reference, "", Shape::Level(0.0))
+    .with(
+        Ink::Estimate,
+        "with it less without it",
+        Shape::Line(line(&difference, (0, run.len()))),
+    );
+    Some(vec![close_up, whole])
+}
+
+/// The stretch in which values are largest on average: its first place, and the one after its last.
+fn most_shown(time_s: &[f64], values: &[f64]) -> (usize, usize) {
+    let mut best = (0.0, (0, values.len()));
+    let (mut from, mut sum) = (0, 0.0);
+    for (to, value) in values.iter().enumerate() {
+        sum += value.abs();
+        while time_s[to] - time_s[from] > STRETCH_S && to - from >= FEWEST_SAMPLES {
+            let mean = sum / (to - from + 1) as f64;
+            if mean > best.0 {
+                best = (mean, (from, to + 1));
+            }
+            sum -= values[from].abs();
+            from += 1;
+        }
+    }
+    best.1
+}
+
+/// What a mechanism of wheel or vehicle does: what the balance lacks, and what the mechanism supplies.
+fn on_balance(diagnosis: &Diagnosis, runs: &[Run], place: usize, id: &str) -> Option<Figure> {
+    let of = |run: &Run| diagnosis.repaired.imbalance(run, place).ok().flatten();
+    let first = runs.iter().find_map(&of)?;
+    let balance = first.balance.as_str();
+    let (means, of_what) = if first.against == Against::Time {
+        let run = strongest(diagnosis, runs, balance)?;
+        let mut imbalance = of(run)?;
+        if id == Id::BrakeLag.as_str() {
+            close_up(&mut imbalance);
+        }
+        (over_time(&imbalance), short_name(&run.name).to_owned())
+    } else {
+        let all: Vec<Imbalance> = runs.iter().filter_map(of).collect();
+        (over_ranges(&all), "all recordings".to_owned())
+    };
+    let (acts_on, unit) = match first.balance {
+        Balance::Wheel => ("torque on the wheel", "N m"),
+        _ => ("force on the vehicle", "N"),
+    };
+    let points = |of: fn(&Mean) -> f64| means.iter().map(|mean| (mean.at, of(mean))).collect();
+    let known = means.iter().filter(|mean| mean.std_of_mean.is_finite());
+    let band: Vec<_> = known
+        .map(|mean| {
+            let std = mean.std_of_mean;
+            (mean.at, mean.lacking - std, mean.lacking + std)
+        })
+        .collect();
+    let mut figure = Figure::new(
+        format!(
+            "What slows the {balance} beside all else in the model, as recorded and as {} has it ({of_what}).",
+            spoken(id)
+        ),
+        Axis::new(against(first.against)),
+        Axis::new(format!("{acts_on} ({unit})")),
+    )
+    .named(format!("effect-{id}"))
+    .with(Ink::Reference, "", Shape::Level(0.0));
+    if !band.is_empty() {
+        figure = figure.with(Ink::Measured, "1-sigma of a mean", Shape::Band(band));
+    }
+    let figure = figure
+        .with(
+            Ink::Measured,
+            "recorded, means",
+            Shape::Points(points(|mean| mean.lacking)),
+        )
+        .with(
+            Ink::Estimate,
+            spoken(id),
+            Shape::Line(points(|mean| mean.supplied)),
+        );
+    (!means.is_empty()).then_some(figure)
+}
+
+fn against(variable: Against) -> &'static str {
+    match variable {
+        Against::Time => "time (s)",
+        Against::VehicleSpeed => "vehicle speed (m/s)",
+        Against::WheelSpeed => "wheel speed (rad/s)",
+        Against::NormalForce => "normal force (N)",
+        Against::Drag => "drag reading (N)",
+        Against::VehicleAcceleration => "acceleration of the vehicle (m/s\u{b2})",
+        Against::WheelAcceleration => "angular acceleration of the wheel (rad/s\u{b2})",
+    }
+}
+
+/// A mean of instants.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Mean {
+    at: f64,
+    lacking: f64,
+    supplied: f64,
+    /// Of `lacking`; not finite where there is nothing to tell it from.
+    std_of_mean: f64,
+}
+
+/// Means over lengths of time of each stretch.
+fn means(imbalance: &Imbalance, length_s: f64) -> Vec<Mean> {
+    let mut means = Vec::new();
+    for stretch in &imbalance.stretches {
+        let mut rest = stretch.as_slice();
+        while let Some(first) = rest.first() {
+            let count = rest.partition_point(|i| i.time_s < first.time_s + length_s);
+            let (block, others) = rest.split_at(count.max(1));
+            rest = others;
+            // What is left at the end of a stretch is shorter, and its noise larger.
+            if rest.is_empty() && block.len() < stretch.len() && !means.is_empty() {
+                break;
+            }
+            let mean =
+                |of: fn(&Instant) -> f64| block.iter().map(of).sum::<f64>() / block.len() as f64;
+            means.push(Mean {
+                at: mean(|i| i.at),
+                lacking: mean(|i| i.lacking),
+                supplied: mean(|i| i.supplied),
+                std_of_mean: f64::NAN,
+            });
+        }
+    }
+    means.retain(|mean| (mean.at + mean.lacking + mean.supplied).is_finite());
+    means
+}
+
+/// Keeps the stretch that shows the effect most: it is over in a moment.
+fn close_up(imbalance: &mut Imbalance) {
+    let largest =
+        |stretch: &Vec<Instant>| stretch.iter().map(|i| i.supplied.abs()).fold(0.0, f64::max);
+    let stretches = std::mem::take(&mut imbalance.stretches);
+    let most = stretches
+        .into_iter()
+        .max_by(|a, b| largest(a).total_cmp(&largest(b)));
+    if let Some(mut stretch) = most {
+        let (time_s, supplied): (Vec<f64>, Vec<f64>) =
+            stretch.iter().map(|i| (i.time_s, i.supplied)).unzip();
+        let (from, to) = most_shown(&time_s, &supplied);
+        stretch.truncate(to);
+        stretch.drain(..from);
+        imbalance.stretches.push(stretch);
+    }
+}
+
+/// Means along one run.
+fn over_time(imbalance: &Imbalance) -> Vec<Mean> {
+    let instants = || imbalance.stretches.iter().flatten();
+    let (Some(first), Some(last)) = (instants().next(), instants().last()) else {
+        return Vec::new();
+    };
+    means(imbalance, (last.time_s - first.time_s) / MEANS)
+}
+
+/// Means over ranges of what the effect is a function of, of all runs.
+fn over_ranges(all: &[Imbalance]) -> Vec<Mean> {
+    let mut short: Vec<Mean> = all.iter().flat_map(|i| means(i, MEAN_S)).collect();
+    short.sort_by(|a, b| a.at.total_cmp(&b.at));
+    let (Some(first), Some(last)) = (short.first(), short.last()) else {
+        return Vec::new();
+    };
+    let width = ((last.at - first.at) / RANGES as f64).max(f64::MIN_POSITIVE);
+    let low = first.at;
+    let range = |mean: &Mean| (((mean.at - low) / width) as usize).min(RANGES - 1);
+    short
+        .chunk_by(|a, b| range(a) == range(b))
+        .filter(|members| members.len() >= FEWEST_MEANS)
+        .map(|members| {
+            let count = members.len() as f64;
+            let mean = |of: fn(&Mean) -> f64| members.iter().map(of).sum::<f64>() / count;
+            let lacking = mean(|m| m.lacking);
+            let squares = members.iter().map(|m| (m.lacking - lacking).powi(2));
+            let variance = squares.sum::<f64>() / (count - 1.0);
+            Mean {
+                at: mean(|m| m.at),
+                lacking,
+                supplied: mean(|m| m.supplied),
+                std_of_mean: (variance / count).sqrt(),
+            }
+        })
+        .collect()
+}
+
+/// The table of an empirical correction, drawn.
+#[must_use]
+pub fn correction(correction: &Correction) -> Option<Figure> {
+    let (what, acts_on) = match correction.acts_on.as_str() {
+        "friction" => ("friction", "relative change of friction"),
+        "force" => ("drag", "added force / mean normal force"),
+        "critical_slip" => ("critical slip", "relative change of critical slip"),
+        _ => return None,
+    };
+    let points: Vec<(f64, f64)> = correction
+        .knots
+        .iter()
+        .copied()
+        .zip(correction.values.iter().copied())
+        .collect();
+    let label = axis_label(&correction.variable);
+    (points.len() > 1).then(|| {
+        Figure::new(
+            format!("The correction of the {what}, for which there is no name."),
+            Axis::new(label),
+            Axis::new(acts_on),
+        )
+        .named(format!("correction-over-{}", correction.variable))
+        .with(Ink::Reference, "", Shape::Level(0.0))
+        .with(Ink::Estimate, "correction", Shape::Line(points.clone()))
+        .with(Ink::Estimate, "its table", Shape::Points(points))
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A vehicle that rolls out for 10 s at 100 Hz under a force in proportion to its speed squared.
+    fn imbalance(against: Against) -> Imbalance {
+        let instant = |k: usize| {
+            let time_s = k as f64 * 0.01;
+            let speed = 30.0 - 2.0 * time_s;
+            let noise = if k % 2 == 0 { 50.0 } else { -50.0 };
+            Instant {
+                time_s,
+                at: if against == Against::Time {
+                    time_s
+                } else {
+                    speed
+                },
+                lacking: 0.5 * speed * speed + noise,
+                supplied: 0.5 * speed * speed,
+            }
+        };
+        Imbalance {
+            balance: Balance::Vehicle,
+            against,
+            stretches: vec![(0..1000).map(instant).collect()],
+        }
+    }
+
+    #[test]
+    fn means_over_ranges_follow_the_effect_within_their_sigma() {
+        let all = over_ranges(&[imbalance(Against::VehicleSpeed)]);
+        assert!((20..=RANGES).contains(&all.len()), "{}", all.len());
+        for mean in all {
+            assert!((mean.lacking - mean.supplied).abs() <= 25.0, "{mean:?}");
+            assert!((mean.supplied - 0.5 * mean.at * mean.at).abs() < 1.0);
+            assert!(mean.std_of_mean > 0.0);
+        }
+    }
+
+    #[test]
+    fn means_over_time_are_as_many_as_can_be_told_apart() {
+        let all = over_time(&imbalance(Against::Time));
+        assert!((70..=90).contains(&all.len()), "{}", all.len());
+        assert!(all.is_sorted_by(|a, b| a.at < b.at));
+    }
+
+    #[test]
+    fn the_stretch_that_shows_an_effect_most_holds_it() {
+        let time: Vec<f64> = (0..5000).map(|k| f64::from(k) * 0.002).collect();
+        let effect = |t: &f64| if (4.0..4.5).contains(t) { 7.0 } else { 0.1 };
+        let values: Vec<f64> = time.iter().map(effect).collect();
+        let (from, to) = most_shown(&time, &values);
+        assert!(time[from] <= 4.0 && time[to - 1] >= 4.49, "{from} {to}");
+        assert!(time[to - 1] - time[from] < 0.81);
+        assert_eq!(most_shown(&time[..9], &values[..9]), (0, 9));
+    }
+}
