@@ -179,12 +179,11 @@ mod tests {
         assert_eq!(
             table.lines(Some(26)),
             [
-                "who it is     far  verdict",
+                "who it is    far  verdict",
                 "--------------------------",
-                "a filter      1.5  kept",
+                "a filter     1.5  kept",
                 "that knows",
-                "another            not",
-                "                   kept",
+                "another           not kept",
             ]
         );
         assert_eq!(

@@ -217,10 +217,13 @@ muslip.Figure = (() => {
     }
     captions(u) {
       const { ctx } = u;
-      const written = [];
-      for (const layer of this.spec.layers.filter((l) => l.shape === "marker" && l.caption)) {
-        const x = u.valToPos(layer.x[0], "x", true);
-        const y = u.valToPos(layer.y[0], "y", true);
+      const dot = 6 * devicePixelRatio;
+      const markers = this.spec.layers.filter((l) => l.shape === "marker").map((layer) => {
+        const [x, y] = [u.valToPos(layer.x[0], "x", true), u.valToPos(layer.y[0], "y", true)];
+        return { layer, x, y, from: x - dot, to: x + dot, top: y - dot, bottom: y + dot };
+      });
+      const taken = [...markers];
+      for (const { layer, x, y } of markers.filter((marker) => marker.layer.caption)) {
         const right = x < u.bbox.left + 0.6 * u.bbox.width;
         ctx.font = FONT.replace("12px", `${12 * devicePixelRatio}px`);
         ctx.fillStyle = ink(layer.ink);
@@ -229,9 +232,9 @@ muslip.Figure = (() => {
         const width = ctx.measureText(layer.caption).width;
         const from = x + (right ? 9 * devicePixelRatio : -9 * devicePixelRatio - width);
         const box = { from, to: from + width, bottom: y - 5 * devicePixelRatio, top: y - 19 * devicePixelRatio };
-        // Of captions that would lie over one another the first is written; the table has them all.
-        if (written.some((other) => box.from < other.to && other.from < box.to && box.top < other.bottom && other.top < box.bottom)) continue;
-        written.push(box);
+        // A caption that would lie over a marker or another caption is left to the table.
+        if (taken.some((other) => box.from < other.to && other.from < box.to && box.top < other.bottom && other.top < box.bottom)) continue;
+        taken.push(box);
         ctx.fillText(layer.caption, x + (right ? 9 : -9) * devicePixelRatio, y - 5 * devicePixelRatio);
       }
     }

@@ -27,6 +27,8 @@ pub struct Run {
     pub peak_friction: (f64, f64),
     /// Critical slip and its 1-sigma.
     pub critical_slip: (f64, f64),
+    /// Correlation of the two.
+    pub correlation: f64,
     /// Mean normalised innovation squared.
     pub mean_nis: f64,
     /// What that says of the filter.
@@ -44,6 +46,7 @@ impl Run {
             page,
             peak_friction: (peak.peak_friction, peak.peak_friction_std),
             critical_slip: (peak.critical_slip, peak.critical_slip_std),
+            correlation: peak.correlation,
             mean_nis: result.consistency.mean_nis,
             verdict: result.consistency.verdict,
             used: result.used,
@@ -58,6 +61,8 @@ pub struct Campaign {
     pub runs: Vec<Run>,
     /// For each run, in what it stands out; empty where in nothing.
     pub stands_out: Vec<Vec<&'static str>>,
+    /// How many runs do not bear out their uncertainty, where that is most of them.
+    pub overconfident: usize,
     /// Median peak friction and the robust standard deviation of the runs about it.
     pub peak_friction: (f64, f64),
     /// The same of the critical slip.
@@ -71,6 +76,10 @@ impl Campaign {
         let slips: Vec<(f64, f64)> = runs.iter().map(|run| run.critical_slip).collect();
         let (peak_friction, far_in_peak) = outliers(&peaks);
         let (critical_slip, far_in_slip) = outliers(&slips);
+        let overconfident = |run: &&Run| run.verdict == Verdict::Overconfident;
+        let overconfident = runs.iter().filter(overconfident).count();
+        // What most runs are, none of them stands out in.
+        let common = overconfident > 1 && 2 * overconfident > runs.len();
         let stands_out = runs
             .iter()
             .zip(far_in_peak.into_iter().zip(far_in_slip))
@@ -78,16 +87,23 @@ impl Campaign {
                 let mut words = Vec::new();
                 words.extend(peak.then_some("peak friction"));
                 words.extend(slip.then_some("critical slip"));
-                words.extend((run.verdict == Verdict::Overconfident).then_some("consistency"));
+                let inconsistent = !common && run.verdict == Verdict::Overconfident;
+                words.extend(inconsistent.then_some("consistency"));
                 words
             })
             .collect();
         Self {
             runs,
             stands_out,
+            overconfident: if common { overconfident } else { 0 },
             peak_friction,
             critical_slip,
         }
+    }
+
+    /// Whether nothing asks for a second look.
+    pub fn is_quiet(&self) -> bool {
+        self.standing_out() == 0 && self.overconfident == 0
     }
 
     /// How many runs stand out.
@@ -109,12 +125,20 @@ impl Campaign {
             crate::wording::plus_minus(self.peak_friction.0, self.peak_friction.1),
             crate::wording::plus_minus(self.critical_slip.0, self.critical_slip.1)
         );
-        match (self.standing_out(), self.runs.len()) {
-            (0, ..FEWEST) => median,
-            (0, _) => format!("{median} None stands out."),
-            (1, _) => format!("{median} One stands out."),
-            (many, _) => format!("{median} {many} stand out."),
-        }
+        let standing_out = match (self.standing_out(), self.runs.len()) {
+            (0, ..FEWEST) => String::new(),
+            (0, _) => " None stands out.".to_owned(),
+            (1, _) => " One stands out.".to_owned(),
+            (many, _) => format!(" {many} stand out."),
+        };
+        let common = match self.overconfident {
+            0 => String::new(),
+            many => format!(
+                " The measurements of {many} do not bear out their uncertainty: they share something that the filter \
+                 does not know."
+            ),
+        };
+        format!("{median}{standing_out}{common}")
     }
 }
 
@@ -179,6 +203,7 @@ mod tests {
             page: "r.html".into(),
             peak_friction: (peak_friction, 0.01),
             critical_slip: (0.15, 0.01),
+            correlation: 0.5,
             mean_nis: 1.0,
             verdict,
             used: 100,
@@ -196,6 +221,13 @@ mod tests {
         assert_eq!(Campaign::new(runs.clone()).standing_out(), 0);
         runs[5].verdict = Verdict::Overconfident;
         assert_eq!(Campaign::new(runs.clone()).stands_out[5], ["consistency"]);
+        // What is true of most of them tells none apart, and is said.
+        for run in &mut runs[1..] {
+            run.verdict = Verdict::Overconfident;
+        }
+        let common = Campaign::new(runs.clone());
+        assert_eq!((common.standing_out(), common.overconfident), (0, 5));
+        assert!(!common.is_quiet() && common.verdict().contains("of 5 do not bear out"));
         // Too few to tell.
         runs.drain(..3);
         runs[2] = run(0.2, Verdict::Consistent);

@@ -3,6 +3,7 @@
 use super::Campaign;
 use crate::report::{
     Axis, Block, Cell, Extent, Figure, Ink, KeyFigure, Report, Row, Section, Shape, Table, Tone,
+    ellipse,
 };
 use crate::wording::plus_minus;
 
@@ -20,7 +21,7 @@ pub fn index(campaign: &Campaign, rig: &str, command: &str) -> Report {
         title: "Campaign".into(),
         subject: format!("{} recordings of {rig}", campaign.runs.len()),
         verdict: campaign.verdict(),
-        tone: if standing_out == 0 {
+        tone: if campaign.is_quiet() {
             Tone::Good
         } else {
             Tone::Warning
@@ -62,6 +63,9 @@ pub fn index(campaign: &Campaign, rig: &str, command: &str) -> Report {
         command: command.to_owned(),
     }
 }
+
+/// Most runs whose ellipses can be told apart.
+const MOST_ELLIPSES: usize = 20;
 
 fn figures(campaign: &Campaign) -> [Figure; 3] {
     let last = campaign.runs.len() as f64;
@@ -108,26 +112,23 @@ fn figures(campaign: &Campaign) -> [Figure; 3] {
         .iter()
         .map(|run| (run.critical_slip.0, run.peak_friction.0))
         .collect();
-    let both = with_runs(
-        Figure::new(
-            "Where the peaks lie.",
-            Axis::new("critical slip").over(around(points.iter().map(|point| point.0))),
-            Axis::new("peak friction").over(around(points.iter().map(|point| point.1))),
-        )
-        .named("peaks"),
-        campaign,
-        &points,
-    );
-    [peak, slip, both]
-}
-
-/// All values, with room on either side.
-fn around(values: impl Iterator<Item = f64>) -> Extent {
-    let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| {
-        (low.min(value), high.max(value))
-    });
-    let margin = (0.08 * (high - low)).max(1e-3);
-    Extent::Fixed(low - margin, high + margin)
+    let mut peaks = Figure::new(
+        "Where the peaks lie.",
+        Axis::new("critical slip"),
+        Axis::new("peak friction"),
+    )
+    .named("peaks");
+    if campaign.runs.len() <= MOST_ELLIPSES {
+        peaks.caption = "Where the peaks lie, each with its 1-sigma ellipse.".into();
+        let mut label = "1-sigma of a run";
+        for run in &campaign.runs {
+            let (slip, peak) = (run.critical_slip, run.peak_friction);
+            let outline = ellipse((slip.0, peak.0), (slip.1, peak.1), run.correlation);
+            peaks = peaks.with(Ink::Reference, label, Shape::Outline(outline));
+            label = "";
+        }
+    }
+    [peak, slip, with_runs(peaks, campaign, &points)]
 }
 
 /// The runs as points, those that stand out as markers.
@@ -138,7 +139,7 @@ fn with_runs(figure: Figure, campaign: &Campaign, points: &[(f64, f64)]) -> Figu
         .filter(|(_, words)| words.is_empty())
         .map(|(point, _)| *point)
         .collect();
-    let mut figure = figure.with(Ink::Measured, "run", Shape::Points(usual));
+    let mut figure = figure.with(Ink::Measured, "a run", Shape::Points(usual));
     let mut label = "stands out";
     for ((point, words), run) in points.iter().zip(&campaign.stands_out).zip(&campaign.runs) {
         if !words.is_empty() {
@@ -179,10 +180,10 @@ fn table(campaign: &Campaign) -> Table {
                     key: None,
                     target: Some(run.page.clone()),
                 },
-                number(run.peak_friction.0, 4),
-                number(run.peak_friction.1, 4),
-                number(run.critical_slip.0, 4),
-                number(run.critical_slip.1, 4),
+                number(run.peak_friction.0, 5),
+                number(run.peak_friction.1, 5),
+                number(run.critical_slip.0, 5),
+                number(run.critical_slip.1, 5),
                 number(run.mean_nis, 3),
                 Cell::from(run.verdict.word().to_owned()),
                 number(run.used as f64, 0),

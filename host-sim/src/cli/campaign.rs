@@ -99,7 +99,7 @@ pub(super) fn run(arguments: &Arguments, terminal: &mut Terminal) -> Result<(), 
     if arguments.json {
         return terminal.json(&to_json(&campaign));
     }
-    terminal.verdict(&campaign.verdict(), campaign.standing_out() == 0)?;
+    terminal.verdict(&campaign.verdict(), campaign.is_quiet())?;
     terminal.line("")?;
     let marked = campaign.runs.iter().zip(&campaign.stands_out);
     const MOST: usize = 15;
@@ -142,6 +142,7 @@ fn to_json(campaign: &Campaign) -> serde_json::Value {
         "peak_friction": quantity(campaign.peak_friction),
         "critical_slip": quantity(campaign.critical_slip),
         "stand_out": campaign.standing_out(),
+        "overconfident_in_common": campaign.overconfident,
         "runs": runs,
     })
 }

@@ -2,10 +2,11 @@
 
 use muslip_diagnose::campaign::Run;
 use muslip_diagnose::imbalance::{Against, Imbalance, Instant};
-use muslip_diagnose::mechanism::{Balance, Id};
+use muslip_diagnose::mechanism::Balance;
 use muslip_diagnose::outcome::Diagnosis;
 use muslip_diagnose::repaired::{Correction, Repaired, Which};
 
+use super::plots::interrupted;
 use super::wording::{axis_label, short_name, spoken};
 use crate::report::{Axis, Figure, Ink, Shape};
 
@@ -17,8 +18,6 @@ const FEWEST_SAMPLES: usize = 60;
 const MOST_POINTS: usize = 1200;
 /// Length over which an acceleration is taken, in s: over one sample it would be all noise.
 const MEAN_S: f64 = 0.05;
-/// Means of a stretch that is shown against time.
-const MEANS: f64 = 80.0;
 /// Ranges of what an effect is a function of, and fewest means of one that is shown.
 const RANGES: usize = 24;
 const FEWEST_MEANS: usize = 3;
@@ -41,10 +40,11 @@ pub fn effects(diagnosis: &Diagnosis, runs: &[Run]) -> Vec<Effect> {
         let figures = run.and_then(|run| on_drag(repaired, run, place));
         (&term.id, figures.unwrap_or_default())
     });
-    let dynamics = repaired.dynamics.iter().enumerate().map(|(place, term)| {
-        let figures = on_balance(diagnosis, runs, place, &term.id).into_iter();
-        (&term.id, figures.collect())
-    });
+    let dynamics = repaired
+        .dynamics
+        .iter()
+        .enumerate()
+        .map(|(place, term)| (&term.id, on_balance(diagnosis, runs, place, &term.id)));
     tyre.chain(dynamics)
         .map(|(id, figures)| Effect {
             id: id.clone(),
@@ -98,12 +98,12 @@ fn on_drag(repaired: &Repaired, run: &Run, place: usize) -> Option<Vec<Figure>> 
     .with(
         Ink::Second,
         "model without it",
-        Shape::Dashes(line(&without_n, (from, to))),
+        Shape::Dashes(interrupted(line(&without_n, (from, to)))),
     )
     .with(
         Ink::Estimate,
         "model with it",
-        Shape::Line(line(&with_n, (from, to))),
+        Shape::Line(interrupted(line(&with_n, (from, to)))),
     );
     let whole = Figure::new(
         format!("What {name} adds to the drag over all of {recording}: with it less without it."),
@@ -115,7 +115,7 @@ fn on_drag(repaired: &Repaired, run: &Run, place: usize) -> Option<Vec<Figure>> 
     .with(
         Ink::Estimate,
         "with it less without it",
-        Shape::Line(line(&difference, (0, run.len()))),
+        Shape::Line(interrupted(line(&difference, (0, run.len())))),
     );
     Some(vec![close_up, whole])
 }
@@ -138,48 +138,74 @@ fn most_shown(time_s: &[f64], values: &[f64]) -> (usize, usize) {
     best.1
 }
 
-/// What a mechanism of wheel or vehicle does: what the balance lacks, and what the mechanism supplies.
-fn on_balance(diagnosis: &Diagnosis, runs: &[Run], place: usize, id: &str) -> Option<Figure> {
+/// What a mechanism of wheel or vehicle does: what the balance lacks, and what the mechanism supplies, over what
+/// it is a function of. One with a memory is a function of no channel: what it does over time, and how far the
+/// recordings follow it.
+fn on_balance(diagnosis: &Diagnosis, runs: &[Run], place: usize, id: &str) -> Vec<Figure> {
     let of = |run: &Run| diagnosis.repaired.imbalance(run, place).ok().flatten();
-    let first = runs.iter().find_map(&of)?;
-    let balance = first.balance.as_str();
-    let (means, of_what) = if first.against == Against::Time {
-        let run = strongest(diagnosis, runs, balance)?;
-        let mut imbalance = of(run)?;
-        if id == Id::BrakeLag.as_str() {
-            close_up(&mut imbalance);
-        }
-        (over_time(&imbalance), short_name(&run.name).to_owned())
-    } else {
-        let all: Vec<Imbalance> = runs.iter().filter_map(of).collect();
-        (over_ranges(&all), "all recordings".to_owned())
+    let mut all: Vec<Imbalance> = runs.iter().filter_map(of).collect();
+    let Some(first) = all.first() else {
+        return Vec::new();
     };
-    let (acts_on, unit) = match first.balance {
+    let (balance, against) = (first.balance, first.against);
+    let (acts_on, unit) = match balance {
         Balance::Wheel => ("torque on the wheel", "N m"),
         _ => ("force on the vehicle", "N"),
     };
-    let points = |of: fn(&Mean) -> f64| means.iter().map(|mean| (mean.at, of(mean))).collect();
-    let known = means.iter().filter(|mean| mean.std_of_mean.is_finite());
-    let band: Vec<_> = known
-        .map(|mean| {
-            let std = mean.std_of_mean;
-            (mean.at, mean.lacking - std, mean.lacking + std)
-        })
-        .collect();
-    let mut figure = Figure::new(
-        format!(
-            "What slows the {balance} beside all else in the model, as recorded and as {} has it ({of_what}).",
-            spoken(id)
-        ),
-        Axis::new(against(first.against)),
-        Axis::new(format!("{acts_on} ({unit})")),
-    )
-    .named(format!("effect-{id}"))
-    .with(Ink::Reference, "", Shape::Level(0.0));
-    if !band.is_empty() {
-        figure = figure.with(Ink::Measured, "1-sigma of a mean", Shape::Band(band));
+    let (balance, name) = (balance.as_str(), spoken(id));
+    let up = Axis::new(format!("{acts_on} ({unit})"));
+    let mut figures = Vec::new();
+    let along = match axis_of(against) {
+        Some(label) => label.to_owned(),
+        None => {
+            if let Some(run) = strongest(diagnosis, runs, balance)
+                && let Some(imbalance) = of(run)
+            {
+                let caption = format!(
+                    "What slows the {balance} beside all else in the model, as {name} has it, over {}.",
+                    short_name(&run.name)
+                );
+                figures.push(
+                    Figure::new(caption, Axis::new("time (s)"), up.clone())
+                        .named(format!("effect-{id}-over-time"))
+                        .with(Ink::Reference, "", Shape::Level(0.0))
+                        .with(Ink::Estimate, &name, Shape::Line(over_time(&imbalance))),
+                );
+            }
+            for instant in all
+                .iter_mut()
+                .flat_map(|i| i.stretches.iter_mut().flatten())
+            {
+                instant.at = instant.supplied;
+            }
+            format!("{acts_on} by {name} ({unit})")
+        }
+    };
+    let means = over_ranges(&all);
+    if means.is_empty() {
+        return figures;
     }
-    let figure = figure
+    let points = |of: fn(&Mean) -> f64| means.iter().map(|mean| (mean.at, of(mean))).collect();
+    let band = means.iter().map(|mean| {
+        let std = mean.std_of_mean;
+        (mean.at, mean.lacking - std, mean.lacking + std)
+    });
+    figures.push(
+        Figure::new(
+            format!(
+                "What slows the {balance} beside all else in the model, as recorded and as {name} has it (all \
+                 recordings)."
+            ),
+            Axis::new(along),
+            up,
+        )
+        .named(format!("effect-{id}"))
+        .with(Ink::Reference, "", Shape::Level(0.0))
+        .with(
+            Ink::Measured,
+            "1-sigma of a mean",
+            Shape::Band(band.collect()),
+        )
         .with(
             Ink::Measured,
             "recorded, means",
@@ -187,21 +213,23 @@ fn on_balance(diagnosis: &Diagnosis, runs: &[Run], place: usize, id: &str) -> Op
         )
         .with(
             Ink::Estimate,
-            spoken(id),
+            name,
             Shape::Line(points(|mean| mean.supplied)),
-        );
-    (!means.is_empty()).then_some(figure)
+        ),
+    );
+    figures
 }
 
-fn against(variable: Against) -> &'static str {
+/// What an effect is a function of; `None` where that is its own history.
+fn axis_of(variable: Against) -> Option<&'static str> {
     match variable {
-        Against::Time => "time (s)",
-        Against::VehicleSpeed => "vehicle speed (m/s)",
-        Against::WheelSpeed => "wheel speed (rad/s)",
-        Against::NormalForce => "normal force (N)",
-        Against::Drag => "drag reading (N)",
-        Against::VehicleAcceleration => "acceleration of the vehicle (m/s\u{b2})",
-        Against::WheelAcceleration => "angular acceleration of the wheel (rad/s\u{b2})",
+        Against::Time => None,
+        Against::VehicleSpeed => Some("vehicle speed (m/s)"),
+        Against::WheelSpeed => Some("wheel speed (rad/s)"),
+        Against::NormalForce => Some("normal force (N)"),
+        Against::Drag => Some("drag reading (N)"),
+        Against::VehicleAcceleration => Some("acceleration of the vehicle (m/s\u{b2})"),
+        Against::WheelAcceleration => Some("angular acceleration of the wheel (rad/s\u{b2})"),
     }
 }
 
@@ -211,7 +239,7 @@ struct Mean {
     at: f64,
     lacking: f64,
     supplied: f64,
-    /// Of `lacking`; not finite where there is nothing to tell it from.
+    /// Of `lacking`; not finite for a mean of one stretch of time.
     std_of_mean: f64,
 }
 
@@ -242,31 +270,20 @@ fn means(imbalance: &Imbalance, length_s: f64) -> Vec<Mean> {
     means
 }
 
-/// Keeps the stretch that shows the effect most: it is over in a moment.
-fn close_up(imbalance: &mut Imbalance) {
-    let largest =
-        |stretch: &Vec<Instant>| stretch.iter().map(|i| i.supplied.abs()).fold(0.0, f64::max);
-    let stretches = std::mem::take(&mut imbalance.stretches);
-    let most = stretches
-        .into_iter()
-        .max_by(|a, b| largest(a).total_cmp(&largest(b)));
-    if let Some(mut stretch) = most {
-        let (time_s, supplied): (Vec<f64>, Vec<f64>) =
-            stretch.iter().map(|i| (i.time_s, i.supplied)).unzip();
-        let (from, to) = most_shown(&time_s, &supplied);
-        stretch.truncate(to);
-        stretch.drain(..from);
-        imbalance.stretches.push(stretch);
-    }
-}
-
-/// Means along one run.
-fn over_time(imbalance: &Imbalance) -> Vec<Mean> {
-    let instants = || imbalance.stretches.iter().flatten();
-    let (Some(first), Some(last)) = (instants().next(), instants().last()) else {
-        return Vec::new();
+/// What a mechanism supplies along one run.
+fn over_time(imbalance: &Imbalance) -> Vec<(f64, f64)> {
+    let count: usize = imbalance.stretches.iter().map(Vec::len).sum();
+    let stride = count.div_ceil(MOST_POINTS).max(1);
+    // A gap between stretches interrupts the line.
+    let gap = |stretch: &Vec<Instant>| (stretch.last().map_or(f64::NAN, |i| i.time_s), f64::NAN);
+    let points = |stretch: &Vec<Instant>| {
+        let instants = stretch.iter().step_by(stride);
+        instants.map(|i| (i.time_s, i.supplied)).collect::<Vec<_>>()
     };
-    means(imbalance, (last.time_s - first.time_s) / MEANS)
+    let stretches = imbalance.stretches.iter();
+    stretches
+        .flat_map(|stretch| points(stretch).into_iter().chain([gap(stretch)]))
+        .collect()
 }
 
 /// Means over ranges of what the effect is a function of, of all runs.
@@ -367,10 +384,17 @@ mod tests {
     }
 
     #[test]
-    fn means_over_time_are_as_many_as_can_be_told_apart() {
-        let all = over_time(&imbalance(Against::Time));
-        assert!((70..=90).contains(&all.len()), "{}", all.len());
-        assert!(all.is_sorted_by(|a, b| a.at < b.at));
+    fn a_line_over_time_is_bounded_and_ends_where_a_stretch_does() {
+        let mut imbalance = imbalance(Against::Time);
+        let second = imbalance.stretches[0].iter().map(|i| Instant {
+            time_s: i.time_s + 20.0,
+            ..*i
+        });
+        let second = second.collect();
+        imbalance.stretches.push(second);
+        let line = over_time(&imbalance);
+        assert!(line.len() <= MOST_POINTS + 4, "{}", line.len());
+        assert_eq!(line.iter().filter(|point| point.1.is_nan()).count(), 2);
     }
 
     #[test]

@@ -94,9 +94,14 @@ fn key_figures(diagnosis: &Diagnosis) -> Vec<KeyFigure> {
     let holdout = &diagnosis.fit.holdout;
     if holdout.before.rmse_n > 0.0 && diagnosis.verdict != Verdict::Consistent {
         let share = 100.0 * (holdout.after.rmse_n / holdout.before.rmse_n - 1.0);
+        let change = if share.abs() < 0.5 {
+            "unchanged".to_owned()
+        } else {
+            format!("{share:+.0} %").replace('-', "\u{2212}")
+        };
         key(
             "Held-out error of the drag",
-            format!("{share:+.0} %").replace('-', "\u{2212}"),
+            change,
             format!(
                 "RMSE {} N to {} N",
                 significant(holdout.before.rmse_n, 3),

@@ -11,6 +11,8 @@ const MOST_RUNS: usize = 3;
 const MOST_POINTS: usize = 800;
 /// Bins of slip.
 const BINS: usize = 24;
+/// Usual steps of time above which a step is a gap.
+const GAP: f64 = 10.0;
 /// Fewest points of a bin that is drawn.
 const FEWEST_IN_BIN: usize = 12;
 
@@ -55,12 +57,12 @@ pub fn drag(diagnosis: &Diagnosis, trace: &Trace) -> Figure {
         .with(
             Ink::Second,
             "base law, refitted",
-            Shape::Line(line(&trace.time_s, &trace.before_n)),
+            Shape::Line(interrupted(line(&trace.time_s, &trace.before_n))),
         )
         .with(
             Ink::Estimate,
             "repaired model",
-            Shape::Line(line(&trace.time_s, &trace.after_n)),
+            Shape::Line(interrupted(line(&trace.time_s, &trace.after_n))),
         )
 }
 
@@ -81,12 +83,12 @@ pub fn remainder(diagnosis: &Diagnosis, trace: &Trace) -> Figure {
         .with(
             Ink::Second,
             "base law, refitted",
-            Shape::Line(line(&trace.time_s, &before)),
+            Shape::Line(interrupted(line(&trace.time_s, &before))),
         )
         .with(
             Ink::Estimate,
             "repaired model",
-            Shape::Line(line(&trace.time_s, &after)),
+            Shape::Line(interrupted(line(&trace.time_s, &after))),
         )
 }
 
@@ -150,6 +152,26 @@ fn line(x: &[f64], y: &[f64]) -> Vec<(f64, f64)> {
         .map(|(&x, &y)| (x, y))
         .filter(|(x, y)| x.is_finite() && y.is_finite())
         .collect()
+}
+
+/// A line over time, interrupted where nothing was recorded.
+pub(super) fn interrupted(points: Vec<(f64, f64)>) -> Vec<(f64, f64)> {
+    let step = |pair: &[(f64, f64)]| match pair {
+        [before, after] => after.0 - before.0,
+        _ => 0.0,
+    };
+    let mut steps: Vec<f64> = points.windows(2).map(step).collect();
+    steps.sort_by(f64::total_cmp);
+    let usual = steps.get(steps.len() / 2).copied().unwrap_or(0.0);
+    let mut parts = Vec::with_capacity(points.len());
+    for (index, point) in points.iter().enumerate() {
+        parts.push(*point);
+        let after = points.get(index..index + 2).unwrap_or_default();
+        if step(after) > GAP * usual {
+            parts.push((point.0, f64::NAN));
+        }
+    }
+    parts
 }
 
 fn cloud(x: &[f64], y: &[f64]) -> Vec<(f64, f64)> {
@@ -220,6 +242,15 @@ fn binned(points: &[(f64, f64)]) -> Vec<Bin> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_line_stops_where_nothing_was_recorded() {
+        let recorded = (0..20).chain(100..120).map(|k| (f64::from(k), 1.0));
+        let line = interrupted(recorded.collect());
+        let gaps: Vec<usize> = (0..line.len()).filter(|k| line[*k].1.is_nan()).collect();
+        assert_eq!((line.len(), gaps), (41, vec![20]));
+        assert!(interrupted(Vec::new()).is_empty());
+    }
 
     #[test]
     fn a_bin_has_the_mean_and_scatter_of_its_points() {

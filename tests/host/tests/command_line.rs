@@ -367,3 +367,55 @@ fn a_page_of_five_thousand_samples_stays_below_two_megabytes() {
     let bytes = scratch.read("r.html").len();
     assert!((100_000..2_000_000).contains(&bytes), "{bytes}");
 }
+
+#[test]
+fn no_line_is_longer_than_the_terminal_has_columns() {
+    let scratch = scratch();
+    scratch.write("other.csv", recording_of(article::measurements(2)));
+    let commands: [&[&str]; 5] = [
+        &["paper", "--seeds", "2"],
+        &["quarter-car", "--stops", "1", "--draws", "1"],
+        &["estimate", "--rig", "rig.toml", "run.csv"],
+        &["fit", "--rig", "rig.toml", "run.csv"],
+        &[
+            "campaign",
+            "--rig",
+            "rig.toml",
+            "--out",
+            "all",
+            "run.csv",
+            "other.csv",
+        ],
+    ];
+    for columns in [60, 80] {
+        for arguments in commands {
+            let mut command = scratch.muslip(arguments);
+            let output = command
+                .env("COLUMNS", columns.to_string())
+                .output()
+                .unwrap();
+            let told = String::from_utf8(output.stdout).unwrap();
+            assert!(told.lines().count() > 3, "{told}");
+            for line in told.lines() {
+                assert!(line.chars().count() <= columns, "{columns}: {line}");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_campaign_with_a_bad_recording_leaves_nothing_behind() {
+    let scratch = scratch();
+    scratch.write("bad.csv", "time_s\nx\n");
+    let files = scratch.files();
+    let campaign = ["campaign", "--rig", "rig.toml", "--out", "all", "run.csv"];
+    let complaint = scratch.complaint(&[&campaign[..], &["bad.csv"]].concat());
+    assert!(complaint.starts_with("bad.csv:1:"), "{complaint}");
+    assert_eq!(scratch.files(), files);
+    scratch.output(&campaign);
+    let index = scratch.read("all/index.html");
+    assert!(index.contains("run.html"));
+    // What was there stays as it was.
+    scratch.complaint(&[&campaign[..], &["bad.csv"]].concat());
+    assert_eq!(scratch.read("all/index.html"), index);
+}

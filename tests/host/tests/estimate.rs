@@ -380,9 +380,11 @@ fn an_uncertainty_that_is_not_borne_out_is_told_with_the_answer() {
         estimate(&scratch, &[])["consistency"]["verdict"],
         "overconfident"
     );
-    let words = scratch.output(&["estimate", "--rig", "rig.toml", "run.csv"]);
+    let mut command = scratch.muslip(&["estimate", "--rig", "rig.toml", "run.csv"]);
+    let words = command.env_remove("COLUMNS").output().unwrap().stdout;
     assert!(
-        words
+        String::from_utf8(words)
+            .unwrap()
             .lines()
             .next()
             .unwrap()

@@ -62,15 +62,25 @@ impl Diagnosed {
             "campaign-0000/rig.toml",
             "--out",
             "answer",
+            "--format",
+            "svg",
         ];
         arguments.extend(runs.iter().map(String::as_str));
         scratch.output(&arguments);
         let text = scratch.read("answer/diagnosis.json");
         diagnosis::assert_valid(&text);
+        let answer: Value = serde_json::from_str(&text).unwrap();
+        for named in answer["mechanisms"].as_array().unwrap() {
+            let picture = format!(
+                "answer/figures/effect-{}.svg",
+                named["id"].as_str().unwrap()
+            );
+            assert!(scratch.path(&picture).exists(), "{picture}");
+        }
         let truth = scratch.read("sealed/campaign-0000/truth.json");
         Self {
             truth: serde_json::from_str(&truth).unwrap(),
-            answer: serde_json::from_str(&text).unwrap(),
+            answer,
             scratch,
         }
     }

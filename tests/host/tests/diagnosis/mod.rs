@@ -80,7 +80,7 @@ pub fn rig() -> Rig {
     }
 }
 
-fn parameter(name: &str, value: f64, std: f64, unit: &str) -> RepairedParameter {
+pub fn parameter(name: &str, value: f64, std: f64, unit: &str) -> RepairedParameter {
     RepairedParameter {
         name: name.into(),
         value,
