@@ -189,8 +189,8 @@ mod tests {
         assert_eq!(
             table.lines(Some(16)),
             [
-                "who it is:",
-                "  a filter that",
+                "who it is: a",
+                "  filter that",
                 "  knows;",
                 "  far: 1.5;",
                 "  verdict: kept",

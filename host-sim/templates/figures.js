@@ -159,7 +159,7 @@ muslip.Figure = (() => {
     border: { show: true, stroke: () => ink("frame"), width: 1 },
     gap: 4,
     size: upright ? (u, labels) => 14 + 7.2 * Math.max(1, ...(labels ?? []).map((label) => label.length)) : 26,
-    space: upright ? 34 : 56,
+    space: upright ? 34 : 72,
     values: axis.log ? logLabels : linearLabels,
     ...(axis.log ? { splits: logSplits, filter: (u, splits) => splits } : {}),
   });

@@ -38,7 +38,7 @@ impl Against {
         }
     }
 
-    fn values<'a>(self, series: &'a Series) -> &'a [f64] {
+    fn values(self, series: &Series) -> &[f64] {
         match self {
             Self::Time => &series.time,
             Self::VehicleSpeed => &series.speed.smooth,

@@ -36,7 +36,7 @@ pub struct Effect {
 pub fn effects(diagnosis: &Diagnosis, runs: &[Run]) -> Vec<Effect> {
     let repaired = &diagnosis.repaired;
     let tyre = repaired.tyre.iter().enumerate().map(|(place, term)| {
-        let run = strongest(diagnosis, runs, "tyre");
+        let run = strongest(diagnosis, runs);
         let figures = run.and_then(|run| on_drag(repaired, run, place));
         (&term.id, figures.unwrap_or_default())
     });
@@ -53,9 +53,9 @@ pub fn effects(diagnosis: &Diagnosis, runs: &[Run]) -> Vec<Effect> {
         .collect()
 }
 
-/// The run with the strongest mismatch in a balance; the first where none is flagged.
-fn strongest<'a>(diagnosis: &Diagnosis, runs: &'a [Run], balance: &str) -> Option<&'a Run> {
-    let flagged = diagnosis.r#where.iter().filter(|i| i.balance == balance);
+/// The run with the strongest mismatch of the tyre; the first where none is flagged.
+fn strongest<'a>(diagnosis: &Diagnosis, runs: &'a [Run]) -> Option<&'a Run> {
+    let flagged = diagnosis.r#where.iter().filter(|i| i.balance == "tyre");
     flagged
         .filter_map(|interval| {
             let run = runs.iter().find(|run| run.name == interval.recording)?;
@@ -143,7 +143,10 @@ fn most_shown(time_s: &[f64], values: &[f64]) -> (usize, usize) {
 /// recordings follow it.
 fn on_balance(diagnosis: &Diagnosis, runs: &[Run], place: usize, id: &str) -> Vec<Figure> {
     let of = |run: &Run| diagnosis.repaired.imbalance(run, place).ok().flatten();
-    let mut all: Vec<Imbalance> = runs.iter().filter_map(of).collect();
+    let shown = runs
+        .iter()
+        .filter_map(|run| Some((short_name(&run.name), of(run)?)));
+    let (names, mut all): (Vec<&str>, Vec<Imbalance>) = shown.unzip();
     let Some(first) = all.first() else {
         return Vec::new();
     };
@@ -158,18 +161,19 @@ fn on_balance(diagnosis: &Diagnosis, runs: &[Run], place: usize, id: &str) -> Ve
     let along = match axis_of(against) {
         Some(label) => label.to_owned(),
         None => {
-            if let Some(run) = strongest(diagnosis, runs, balance)
-                && let Some(imbalance) = of(run)
-            {
+            let most = names
+                .iter()
+                .zip(&all)
+                .max_by(|a, b| largest(a.1).total_cmp(&largest(b.1)));
+            if let Some((recording, imbalance)) = most {
                 let caption = format!(
-                    "What slows the {balance} beside all else in the model, as {name} has it, over {}.",
-                    short_name(&run.name)
+                    "What slows the {balance} beside all else in the model, as {name} has it, over {recording}."
                 );
                 figures.push(
                     Figure::new(caption, Axis::new("time (s)"), up.clone())
                         .named(format!("effect-{id}-over-time"))
                         .with(Ink::Reference, "", Shape::Level(0.0))
-                        .with(Ink::Estimate, &name, Shape::Line(over_time(&imbalance))),
+                        .with(Ink::Estimate, &name, Shape::Line(over_time(imbalance))),
                 );
             }
             for instant in all
@@ -218,6 +222,12 @@ fn on_balance(diagnosis: &Diagnosis, runs: &[Run], place: usize, id: &str) -> Ve
         ),
     );
     figures
+}
+
+/// The largest that a mechanism supplies.
+fn largest(imbalance: &Imbalance) -> f64 {
+    let instants = imbalance.stretches.iter().flatten();
+    instants.map(|i| i.supplied.abs()).fold(0.0, f64::max)
 }
 
 /// What an effect is a function of; `None` where that is its own history.
@@ -353,7 +363,7 @@ mod tests {
         let instant = |k: usize| {
             let time_s = k as f64 * 0.01;
             let speed = 30.0 - 2.0 * time_s;
-            let noise = if k % 2 == 0 { 50.0 } else { -50.0 };
+            let noise = if k.is_multiple_of(2) { 50.0 } else { -50.0 };
             Instant {
                 time_s,
                 at: if against == Against::Time {

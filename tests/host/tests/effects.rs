@@ -33,8 +33,15 @@ peak_friction = 0.75
 critical_slip = 0.15
 ";
 
-/// Mechanisms of wheel and vehicle, each with its parameters.
-const DYNAMICS: [(&str, &str, &[(&str, f64, &str)]); 8] = [
+/// A mechanism: its id, its form, and name, value and unit of each parameter.
+type Case = (
+    &'static str,
+    &'static str,
+    &'static [(&'static str, f64, &'static str)],
+);
+
+/// Mechanisms of wheel and vehicle.
+const DYNAMICS: [Case; 8] = [
     ("aero_drag", "", &[("coefficient", 1.1, "kg/m")]),
     ("grade_or_drive", "", &[("force", -600.0, "N")]),
     ("vehicle_inertia", "", &[("mass_error", 0.2, "1")]),
@@ -50,7 +57,7 @@ const DYNAMICS: [(&str, &str, &[(&str, f64, &str)]); 8] = [
 ];
 
 /// The base law and one mechanism of wheel or vehicle.
-fn model((id, form, parameters): (&str, &str, &[(&str, f64, &str)])) -> Repaired {
+fn model((id, form, parameters): Case) -> Repaired {
     let mut model = repaired();
     model.rig.torque_per_pressure_nm_pa = Some(3.2e-4);
     model.tyre.clear();
