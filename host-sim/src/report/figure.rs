@@ -202,13 +202,11 @@ impl Figure {
             layer.shape.spread(&mut along, &mut up);
         }
         // A dot at the end of an axis shows as a whole; a line ends where the axis does.
-        let dots = |layer: &Layer| matches!(layer.shape, Shape::Points(_) | Shape::Marker(..));
-        let margin = if self.layers.iter().any(dots) {
-            0.015
-        } else {
-            0.0
-        };
-        (along.range(&self.x, margin), up.range(&self.y, 0.06))
+        let is_dots = |layer: &Layer| matches!(layer.shape, Shape::Points(_) | Shape::Marker(..));
+        let dots = self.layers.iter().any(is_dots);
+        let margin = if dots { 0.015 } else { 0.0 };
+        let along = along.range(&self.x, margin, !dots);
+        (along, up.range(&self.y, 0.06, true))
     }
 }
 
@@ -251,7 +249,8 @@ impl Shape {
 }
 
 impl Spread {
-    fn range(self, axis: &Axis, margin: f64) -> (f64, f64) {
+    /// `snaps`: whether a range that must include a value ends there, where nothing lies beyond.
+    fn range(self, axis: &Axis, margin: f64, snaps: bool) -> (f64, f64) {
         if let Extent::Fixed(low, high) = axis.extent
             && let (Some(low), Some(high)) = (axis.position(low), axis.position(high))
             && low < high
@@ -282,8 +281,7 @@ impl Spread {
         } else {
             0.5 * high.abs().max(1.0)
         };
-        // A range that must include a value ends there, where nothing lies beyond.
-        let ends_at = |end: f64| axis.extent == Extent::Including(end);
+        let ends_at = |end: f64| snaps && axis.extent == Extent::Including(end);
         (
             if ends_at(low) && high > low {
                 low

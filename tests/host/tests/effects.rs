@@ -7,31 +7,13 @@ mod diagnosis;
 use std::path::PathBuf;
 
 use common::Scratch;
-use diagnosis::{parameter, partly_explained, repaired};
+use diagnosis::{RIG, parameter, partly_explained, repaired};
 use host_sim::diagnose::effects::effects;
 use host_sim::diagnose::load;
 use host_sim::diagnose::model_file::to_text;
 use muslip_diagnose::campaign::Run;
 use muslip_diagnose::outcome::Diagnosis;
 use muslip_diagnose::repaired::{Repaired, RepairedTerm};
-
-const RIG: &str = "\
-[wheel]
-radius_m = 0.31
-inertia_kg_m2 = 1.25
-
-[vehicle]
-mass_kg = 1260.0
-coasting = true
-
-[brake]
-torque_per_pressure_nm_pa = 3.2e-4
-
-[tyre]
-law = \"rudd\"
-peak_friction = 0.75
-critical_slip = 0.15
-";
 
 /// A mechanism: its id, its form, and name, value and unit of each parameter.
 type Case = (
@@ -78,7 +60,8 @@ fn model((id, form, parameters): Case) -> Repaired {
 
 /// A run in which a model is true, as sensors without noise read it.
 fn run_under(model: &Repaired) -> Run {
-    let scratch = Scratch::with_rig(RIG);
+    let brake = "[brake]\ntorque_per_pressure_nm_pa = 3.2e-4\n";
+    let scratch = Scratch::with_rig(&format!("{RIG}\n{brake}"));
     scratch.write("model.toml", to_text(model, "true").unwrap());
     scratch.output(&[
         "simulate",
