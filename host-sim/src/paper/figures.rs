@@ -130,7 +130,7 @@ pub fn convergence(seed: u64) -> Result<Convergence, PassError> {
 }
 
 fn slip_axis() -> Axis {
-    Axis::new("slip").over(Extent::Fixed(0.0, 1.0))
+    Axis::new("slip").over(Extent::Fixed(-0.015, 1.015))
 }
 
 /// Slips at which a curve is drawn: dense where it bends.

@@ -51,6 +51,14 @@ impl Table {
     }
 }
 
+impl Table {
+    /// The head, in which a sigma stays with its number.
+    pub(super) fn heads(&self) -> impl Iterator<Item = String> + '_ {
+        let whole = |head: &String| typeset(head).replace("-sigma", "\u{2011}sigma");
+        self.head.iter().map(whole)
+    }
+}
+
 impl Cell {
     /// Most characters of a cell that stays on one line.
     const SHORT: usize = 20;
