@@ -4,6 +4,7 @@ use muslip_diagnose::mechanism::Id;
 use muslip_diagnose::outcome::{
     Diagnosis, Interval, MinimumDetectable, NamedMechanism, Role, Verdict,
 };
+use muslip_diagnose::repaired::RepairedTerm;
 
 use super::proof::proof;
 use super::views::Views;
@@ -17,6 +18,8 @@ use crate::report::{Block, KeyFigure, Report, Section, Table, Tone};
 
 /// Most rows of the tables that grow with the recordings.
 const MOST_ROWS: usize = 24;
+/// Most parameters of a mechanism's equation that are listed.
+const MOST_PARAMETERS: usize = 6;
 
 /// The report of a diagnosis. `command` is what made it.
 #[must_use]
@@ -138,7 +141,13 @@ fn findings(diagnosis: &Diagnosis, views: &Views) -> Section {
     let mut blocks = Vec::new();
     for mechanism in &diagnosis.mechanisms {
         blocks.push(Block::Paragraph(mechanism_sentence(mechanism)));
-        blocks.push(mechanism_table(mechanism));
+        let mut terms = diagnosis
+            .repaired
+            .tyre
+            .iter()
+            .chain(&diagnosis.repaired.dynamics);
+        let term = terms.find(|term| term.id == mechanism.id);
+        blocks.push(mechanism_table(mechanism, term));
         blocks.extend(
             views
                 .effect(mechanism.id)
@@ -176,13 +185,31 @@ fn findings(diagnosis: &Diagnosis, views: &Views) -> Section {
     section("What is missing", blocks)
 }
 
-fn mechanism_table(mechanism: &NamedMechanism) -> Block {
+/// `term`: the mechanism as the repaired model has it.
+fn mechanism_table(mechanism: &NamedMechanism, term: Option<&RepairedTerm>) -> Block {
     let mut rows = vec![["equation".to_owned(), mechanism.equation.clone()]];
     for figure in &mechanism.parameters {
         rows.push([
             spoken(&figure.name),
             quantity(figure.value, figure.std, &figure.unit),
         ]);
+    }
+    // Further parameters of the equation, unless they are the coefficients of a phase in every run.
+    let reported = |name: &str| {
+        mechanism
+            .parameters
+            .iter()
+            .any(|figure| figure.name == name)
+    };
+    let further = term.map_or(&[][..], |term| &term.parameters);
+    if further.len() <= MOST_PARAMETERS {
+        let further = further.iter().filter(|further| !reported(&further.name));
+        rows.extend(further.map(|further| {
+            [
+                format!("{} (model)", spoken(&further.name)),
+                quantity(further.value, further.std, &further.unit),
+            ]
+        }));
     }
     let evidence = &mechanism.evidence;
     rows.push([
