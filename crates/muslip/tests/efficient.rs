@@ -78,7 +78,7 @@ fn single_precision_over_41_samples_is_as_accurate_as_batch_maximum_likelihood()
     ] {
         for declared in [0.5, 1.0, 1.5] {
             let mut squares = [[0.0; 2]; 2];
-            for seed in 0..200 {
+            for seed in 0..800 {
                 let points = points(mup, sp, &slips, seed);
                 let best = maximum_likelihood(&points);
                 let mut filter = Config::for_range(range).build().unwrap();
@@ -150,7 +150,7 @@ fn outliers_are_rejected_or_taken_out_again() {
         dirty += errors(&points);
     }
     let ratio = (dirty / clean).sqrt();
-    assert!(ratio < 1.25, "{ratio}");
+    assert!(ratio < 1.15, "{ratio}");
 }
 
 #[test]
@@ -262,12 +262,8 @@ fn a_field_outside_its_range_is_named() {
         }
     };
     assert_eq!(
-        refused(|c| c.initial_state.critical_slip = 0.6),
+        refused(|c| c.initial_state.critical_slip = 3.0),
         ConfigParameter::InitialState
-    );
-    assert_eq!(
-        refused(|c| c.centre_slip = 0.0),
-        ConfigParameter::CentreSlip
     );
     assert_eq!(
         refused(|c| c.nis_gate = Some(f32::NAN)),

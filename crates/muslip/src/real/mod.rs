@@ -9,6 +9,12 @@ mod sine;
 use core::fmt::Debug;
 use core::ops::{Add, AddAssign, Div, DivAssign, Mul, MulAssign, Neg, Sub, SubAssign};
 
+/// Quarters of binades from 1/64 to 1.
+pub(crate) const QUARTER_BINADES: usize = LAST_QUARTER as usize + 1;
+const LAST_QUARTER: u32 = 23;
+/// The first of them among all of an `f32`: four a binade from 2^-127, and 1/64 is 2^-6.
+const FIRST_QUARTER: u32 = 4 * (127 - 6);
+
 /// A real scalar: `f32` on the target, `f64` on the host, a dual number in tests.
 ///
 /// Implementations may be wrappers that carry derivatives: nothing in this crate sends a value through
@@ -80,6 +86,38 @@ pub trait Real:
     fn squared(self) -> Self {
         self * self
     }
+
+    /// The quarter of a binade that the magnitude lies in, and its middle.
+    ///
+    /// Counted from 0 at 1/64 to 23 below 1; what lies beyond counts to the first or the last, and NaN to
+    /// either. `f32` reads it off its exponent and first two digits.
+    #[inline]
+    fn quarter_binade(self) -> (usize, Self) {
+        let magnitude = self.abs();
+        let mut index = 0;
+        let mut middle = Self::middle_of_quarter_binade(0);
+        // A quarter ends where the next begins: half a quarter beyond its middle.
+        for next in 1..QUARTER_BINADES {
+            let above = Self::middle_of_quarter_binade(next);
+            let width = Self::from_f64(1.0 / 512.0 * f64::from(1 << (next / 4)));
+            if magnitude < above - width {
+                break;
+            }
+            (index, middle) = (next, above);
+        }
+        (index, middle)
+    }
+
+    /// The middle of a quarter of a binade, counted as [`Real::quarter_binade`] does.
+    #[inline]
+    fn middle_of_quarter_binade(index: usize) -> Self {
+        let mut low = Self::from_f64(1.0 / 64.0);
+        for _ in 0..index / 4 {
+            low = low + low;
+        }
+        let quarters = [1.125, 1.375, 1.625, 1.875];
+        low * Self::from_f64(quarters.get(index % 4).copied().unwrap_or_default())
+    }
 }
 
 impl Real for f32 {
@@ -132,6 +170,22 @@ impl Real for f32 {
     fn is_finite(self) -> bool {
         // On an FPU cheaper than taking the bits apart.
         libm::fabsf(self) <= f32::MAX
+    }
+    #[inline(always)]
+    fn quarter_binade(self) -> (usize, Self) {
+        // Without its sign a number's upper bits are its exponent and the first two digits: quarters of
+        // binades, counted from 2^-127.
+        let quarter = (self.to_bits() << 1) >> 22;
+        let index = quarter.saturating_sub(FIRST_QUARTER).min(LAST_QUARTER) as usize;
+        (index, Self::middle_of_quarter_binade(index))
+    }
+    #[inline(always)]
+    #[expect(
+        clippy::cast_possible_truncation,
+        reason = "what is beyond the last is no quarter that anything lies in"
+    )]
+    fn middle_of_quarter_binade(index: usize) -> Self {
+        f32::from_bits(((index as u32).wrapping_add(FIRST_QUARTER) << 21) | (1 << 20))
     }
 }
 
@@ -191,6 +245,25 @@ mod tests {
         assert_eq!(Real::max(f64::NAN, 2.0), 2.0);
         assert_eq!(Real::min(1.0_f64, 2.0), 1.0);
         assert_eq!(Real::max(1.0_f32, 2.0), 2.0);
+    }
+
+    #[test]
+    fn a_slip_lies_in_the_quarter_of_its_binade_in_either_precision() {
+        for i in 0..20_000_u16 {
+            let slip = f32::from(i) / 16_384.0;
+            let (index, middle) = slip.quarter_binade();
+            assert_eq!(
+                (-f64::from(slip)).quarter_binade(),
+                (index, f64::from(middle))
+            );
+            // Written a second time.
+            let clamped = f64::from(slip).clamp(1.0 / 64.0, 0.999_999);
+            let binade = 2.0_f64.powi(clamped.log2().floor() as i32);
+            let quarter = ((clamped / binade - 1.0) * 4.0).floor();
+            assert_eq!(f64::from(middle), binade * (1.0 + (quarter + 0.5) / 4.0));
+            assert_eq!(index, (4.0 * (binade.log2() + 6.0) + quarter) as usize);
+        }
+        assert_eq!(f32::INFINITY.quarter_binade().0, 23);
     }
 
     #[test]

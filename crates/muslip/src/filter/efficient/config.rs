@@ -1,6 +1,7 @@
 use core::fmt;
 
-use super::filter::{EfficientFilter, Estimate};
+use super::estimate::{Estimate, SLIPS};
+use super::filter::EfficientFilter;
 use crate::filter::mu_slip::{Range, State};
 use crate::real::Real;
 
@@ -9,11 +10,8 @@ use crate::real::Real;
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Config<T> {
-    /// State to start from; finite and positive, sp within 0.38 to 2.63 times [`Self::centre_slip`].
+    /// State to start from; finite and positive, sp within 1/64 to 2, which estimates of it are held in, too.
     pub initial_state: State<T>,
-    /// The slip s0 that the sums are taken about, dimensionless, > 0; default √(0.1 · 0.2), the middle of
-    /// the tyres' range. Estimates of sp are held within 0.38 to 2.63 times this.
-    pub centre_slip: T,
     /// Normalised innovation squared above which a measurement is rejected; default 16 (four sigma).
     /// `None` believes every measurement, and suspects none.
     pub nis_gate: Option<T>,
@@ -28,10 +26,8 @@ pub struct Config<T> {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub enum ConfigParameter {
-    /// `initial_state`: finite, positive, sp within reach of the centre.
+    /// `initial_state`: finite, positive, sp within 1/64 to 2.
     InitialState,
-    /// `centre_slip`: finite and positive.
-    CentreSlip,
     /// `nis_gate`: positive and not NaN.
     NisGate,
     /// `memory`: above 4, finite.
@@ -53,7 +49,6 @@ impl<T: Real> Config<T> {
     pub fn for_range(range: Range) -> Self {
         Self {
             initial_state: range.initial_state(),
-            centre_slip: T::from_f64(0.141_421_356),
             nis_gate: Some(T::from_f64(16.0)),
             memory: None,
         }
@@ -65,13 +60,10 @@ impl<T: Real> Config<T> {
     /// [`ConfigError`] naming the first field that is outside its range.
     pub fn build(self) -> Result<EfficientFilter<T>, ConfigError> {
         let refuse = |parameter| Err(ConfigError::OutOfRange(parameter));
-        let centre = self.centre_slip;
-        if !(centre.is_finite() && centre > T::ZERO) {
-            return refuse(ConfigParameter::CentreSlip);
-        }
         let start = self.initial_state;
-        let relative = start.critical_slip / centre;
-        if !start.is_physical() || relative < T::from_f64(0.38) || relative > T::from_f64(2.63) {
+        let (least, most) = SLIPS;
+        let slip = start.critical_slip;
+        if !start.is_physical() || slip < T::from_f64(least) || slip > T::from_f64(most) {
             return refuse(ConfigParameter::InitialState);
         }
         if self.nis_gate.is_some_and(|gate| !positive(gate)) {
@@ -103,9 +95,8 @@ impl fmt::Display for ConfigError {
         let Self::OutOfRange(parameter) = self;
         f.write_str(match parameter {
             ConfigParameter::InitialState => {
-                "initial state is not finite, positive and within reach of the centre slip"
+                "initial state is not finite, positive and its slip within 1/64 to 2"
             }
-            ConfigParameter::CentreSlip => "centre slip is not finite and positive",
             ConfigParameter::NisGate => "gate on the normalised innovation is not positive",
             ConfigParameter::Memory => "memory is not finite and above 4 samples",
         })
