@@ -25,6 +25,11 @@ const FAR: f64 = 0.25;
 pub(super) const FIRST_RENEWAL: u32 = 6;
 /// Curvature in ln sp over m² Σ w sech² tanh² below which it is rounding.
 const ROUNDING: f64 = 16.0;
+/// Curvature of the likelihood in ln sp over mup² Σ w sech² (0.1 to 0.3 of a run through the peak) below
+/// which it is not believed.
+const LEAST_CURVATURE: f64 = 2e-3;
+/// Least share of it that is believed all the same: the prior is divided by this.
+const LEAST_BELIEVED: f64 = 1e-3;
 /// Sum of weights from which all are scaled down.
 const LARGEST_SUM: f64 = 65_536.0;
 /// Number of samples at which all sums are halved.
@@ -76,7 +81,9 @@ pub(super) struct Prior<T> {
     /// Precision of mup, and times its mean.
     pub(super) weight: T,
     pub(super) friction: T,
-    /// Precision of ln sp, and times the distance of its mean from s0.
+    /// Share of the information on ln sp that is believed.
+    pub(super) believed: T,
+    /// Precision of ln sp over that, and times the distance of its mean from s0.
     pub(super) slip_weight: T,
     pub(super) slip: T,
 }
@@ -85,6 +92,7 @@ impl<T: Real> Prior<T> {
     const NONE: Self = Self {
         weight: T::ZERO,
         friction: T::ZERO,
+        believed: T::ONE,
         slip_weight: T::ZERO,
         slip: T::ZERO,
     };
@@ -186,7 +194,7 @@ impl<T: Real> Estimate<T> {
         let curvature = (m * m * (law_curvature - law_slope * ratio)).max(T::ZERO);
         // P = noise [[D, m D'/2], [m D'/2, m² Σ w sech² tanh²]]⁻¹
         let slope = m * ratio;
-        let p11 = noise / (curvature + self.prior.slip_weight);
+        let p11 = noise / (self.prior.believed * (curvature + self.prior.slip_weight));
         Covariance {
             p00: noise * by_law + slope * slope * p11,
             p01: -(slope * p11),
@@ -265,16 +273,21 @@ impl<T: Real> Estimate<T> {
         if curvature <= T::from_f64(ROUNDING) * T::EPSILON * spread {
             curvature = T::ZERO;
         }
+        // Slips that all lie before the peak say little of it, and what they say is far from normal.
+        let least = T::from_f64(LEAST_CURVATURE) * m * m * sums.law;
+        let square = curvature * curvature;
+        let believed = (square / (square + least * least)).max(T::from_f64(LEAST_BELIEVED));
         // Without information the prior holds ln sp; it fades as samples speak.
-        let share = noise / (noise + curvature);
-        let slip_weight = T::from_f64(PRIOR_PRECISION) * noise * (share * share);
+        let share = noise / (noise + believed * curvature);
+        let slip_weight = T::from_f64(PRIOR_PRECISION) * noise * (share * share) / believed;
         self.prior = Prior {
             weight,
             friction: weight * start,
+            believed,
             slip_weight,
             slip: slip_weight * self.start_log_slip,
         };
-        self.far = T::from_f64(FAR) * noise / (curvature + slip_weight);
+        self.far = T::from_f64(FAR) * noise / (believed * (curvature + slip_weight));
         self.suspect_level = match (config.nis_gate, config.memory) {
             (None, None) => T::ONE / T::MIN_POSITIVE,
             // With forgetting each sample is looked at closely: there the forgetting is done.

@@ -47,7 +47,7 @@ impl<T: Real> EfficientFilter<T> {
     /// The present covariance of (mup, sp).
     pub fn covariance(&self) -> Covariance<T> {
         let slip = self.state().critical_slip;
-        let Covariance { p00, p01, p11 } = self.estimate.covariance();
+        let Covariance { p00, p01, p11 } = self.renewed().covariance();
         Covariance {
             p00,
             p01: slip * p01,
@@ -57,7 +57,14 @@ impl<T: Real> EfficientFilter<T> {
 
     /// Learnt over declared noise variance, within 0.15 to 10.
     pub fn noise_factor(&self) -> T {
-        self.estimate.noise_factor()
+        self.renewed().noise_factor()
+    }
+
+    /// The estimate with its noise taken anew, which an update does only now and then.
+    fn renewed(&self) -> Estimate<T> {
+        let mut estimate = self.estimate;
+        estimate.renew(&self.config);
+        estimate
     }
 
     /// Back to the start.
@@ -106,7 +113,7 @@ impl<T: Real> Estimator<T> for EfficientFilter<T> {
             by_log_slip,
             signal,
             noise,
-        } = self.estimate.expected(slip_ratio, variance);
+        } = self.renewed().expected(slip_ratio, variance);
         let innovation = friction - predicted_friction;
         let mut after = self.estimate;
         let decision = after.fuse(&self.config, slip_ratio, friction, variance);
