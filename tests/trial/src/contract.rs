@@ -2,7 +2,7 @@
 
 use serde_json::Value;
 
-use crate::form::VOCABULARY;
+use crate::generate::form::VOCABULARY;
 
 const VERDICTS: [&str; 5] = [
     "consistent",

@@ -9,15 +9,15 @@ use anyhow::{Context, Result, bail};
 use rayon::prelude::*;
 use serde_json::Value;
 
-use crate::campaign::{Order, make_with_twin};
 use crate::draw::Draw;
-use crate::effect::{Effect, Scale};
-use crate::files::recording;
-use crate::form::{Form, mechanism};
-use crate::rig::Rig;
+use crate::generate::campaign::{Order, make_with_twin};
+use crate::generate::effect::{Effect, Scale};
+use crate::generate::files::recording;
+use crate::generate::form::{Form, mechanism};
+use crate::generate::rig::Rig;
+use crate::generate::tyre::{Contact, curve_scaling};
 use crate::share::quantile;
 use crate::table::Table;
-use crate::tyre::{Contact, curve_scaling};
 
 /// Mechanisms that the estimator can compensate.
 const COMPENSATED: [&str; 9] = [

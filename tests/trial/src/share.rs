@@ -67,7 +67,7 @@ pub fn quantile(values: &[f64], at: f64) -> f64 {
     if sorted.is_empty() {
         f64::NAN
     } else {
-        crate::chain::at(&sorted, at * (sorted.len() - 1) as f64)
+        crate::generate::chain::at(&sorted, at * (sorted.len() - 1) as f64)
     }
 }
 

@@ -9,7 +9,7 @@ use anyhow::{Context, Result};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-use crate::files::read_column;
+use crate::generate::files::read_column;
 use crate::process::{Cost, run};
 
 /// Longest that one call may take.

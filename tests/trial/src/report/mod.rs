@@ -1,0 +1,5 @@
+//! The whole trial and its pages.
+
+pub mod pace;
+pub mod pages;
+pub mod trial;

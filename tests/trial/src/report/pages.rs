@@ -1,0 +1,213 @@
+//! The pages of a trial: what is read first, and the long tables beside it.
+
+use std::fmt::Write as _;
+use std::fs;
+use std::path::Path;
+
+use anyhow::{Context, Result};
+
+use crate::judge::case::Case;
+use crate::judge::cause::{shortfalls, symptom};
+use crate::judge::score::Report;
+use crate::judge::{bars, rivals, tally};
+use crate::table::Table;
+
+/// What the pages tell beside the judged campaigns.
+pub struct Telling<'a> {
+    pub introduction: String,
+    pub report: &'a Report,
+    pub ablations: &'a Table,
+    pub pace: &'a Table,
+    pub measured: &'a [Table],
+    /// What people found out about single cases: campaign's number and the cause.
+    pub notes: &'a [(String, String)],
+}
+
+/// Writes `trials.md` and the long tables into `trials/` beside it.
+pub fn write(directory: &Path, telling: &Telling<'_>) -> Result<()> {
+    let beside = directory.join("trials");
+    fs::create_dir_all(&beside).with_context(|| format!("cannot make {}", beside.display()))?;
+    let put = |name: &Path, text: String| {
+        fs::write(name, text).with_context(|| format!("cannot write {}", name.display()))
+    };
+    put(&directory.join("trials.md"), front(telling))?;
+    put(
+        &beside.join("confusion.md"),
+        format!(
+            "# What was named for what\n\nPart of the [sealed trial](../trials.md).\n\n{}",
+            tally::confusion(&telling.report.cases).markdown()
+        ),
+    )?;
+    put(&beside.join("cases.csv"), cases_csv(&telling.report.cases))?;
+    put(
+        &beside.join("parameters.csv"),
+        parameters_csv(&telling.report.cases),
+    )?;
+    Ok(())
+}
+
+fn front(telling: &Telling<'_>) -> String {
+    let cases = &telling.report.cases;
+    let mut text = telling.introduction.clone();
+    let mut tables = vec![bars::bars(cases), telling.pace.clone(), shortfalls(cases)];
+    tables.extend(telling.measured.iter().cloned());
+    if !telling.report.baselines.is_empty() {
+        tables.push(rivals::baselines(cases, &telling.report.baselines));
+    }
+    tables.push(telling.ablations.clone());
+    tables.extend([
+        tally::nulls(cases),
+        tally::mechanisms(cases),
+        tally::strengths(cases),
+        tally::outside(cases),
+        tally::calibration(cases),
+        tally::pulls(cases),
+    ]);
+    for table in tables.iter().filter(|table| !table.rows.is_empty()) {
+        text.push_str(&table.markdown());
+    }
+    text.push_str(
+        "## Long tables\n\n\
+         - [Confusion matrix](trials/confusion.md)\n\
+         - [Every campaign](trials/cases.csv)\n\
+         - [Every parameter](trials/parameters.csv)\n\n\
+         ## The twenty worst cases\n\n\
+         Most embarrassing first. What went wrong is read off the files by the scorer; a line behind \"cause\" was found out by hand.\n\n",
+    );
+    for case in tally::worst(cases, 20) {
+        let _ = write!(text, "```text\n{}\n```\n\n{}", case.line(), symptom(case));
+        text.push('.');
+        for (_, note) in telling
+            .notes
+            .iter()
+            .filter(|(name, _)| *name == case.campaign)
+        {
+            let _ = write!(text, " Cause: {note}");
+        }
+        text.push_str("\n\n");
+    }
+    text
+}
+
+fn quoted(text: &str) -> String {
+    if text.contains([',', '"', '\n']) {
+        format!("\"{}\"", text.replace('"', "\"\""))
+    } else {
+        text.to_owned()
+    }
+}
+
+fn cases_csv(cases: &[Case]) -> String {
+    let mut text = String::from(
+        "campaign,stratum,kind,concealed,forms,size_sigma,verdict,named,confidence,left,first_right,in_set,f1,honest,variable_right,iou,gain_shares,worse,processor_s,samples,what_went_wrong\n",
+    );
+    let join = |items: Vec<String>| items.join(";");
+    for case in cases {
+        let cells = [
+            case.campaign.clone(),
+            case.stratum.clone(),
+            case.kind.clone(),
+            join(case.truth.clone()),
+            join(case.forms.clone()),
+            join(case.strength.iter().map(|s| format!("{s:.2}")).collect()),
+            case.verdict.clone(),
+            join(case.named.iter().map(|n| n.id.clone()).collect()),
+            join(
+                case.named
+                    .iter()
+                    .map(|n| format!("{:.3}", n.confidence))
+                    .collect(),
+            ),
+            join(case.unexplained.clone()),
+            case.first_right.to_string(),
+            case.in_set.to_string(),
+            format!("{:.2}", case.f1),
+            case.honest.to_string(),
+            case.variable_right
+                .map_or_else(String::new, |right| right.to_string()),
+            case.iou.map_or_else(String::new, |iou| format!("{iou:.3}")),
+            join(
+                case.gains
+                    .iter()
+                    .map(|g| {
+                        g.share
+                            .map_or_else(|| "-".to_owned(), |s| format!("{s:.3}"))
+                    })
+                    .collect(),
+            ),
+            case.gains.iter().filter(|g| g.worse).count().to_string(),
+            format!("{:.1}", case.processor_s),
+            case.samples.to_string(),
+            if case.failed() {
+                symptom(case)
+            } else {
+                String::new()
+            },
+        ];
+        let line: Vec<String> = cells.iter().map(|cell| quoted(cell)).collect();
+        text.push_str(&line.join(","));
+        text.push('\n');
+    }
+    text
+}
+
+fn parameters_csv(cases: &[Case]) -> String {
+    let mut text = String::from("campaign,form,mechanism,parameter,truth,reported,std,pull\n");
+    for case in cases {
+        for figure in &case.figures {
+            let _ = writeln!(
+                text,
+                "{},{},{},{},{:.6e},{:.6e},{:.3e},{:.2}",
+                case.campaign,
+                case.forms.join(";"),
+                figure.mechanism,
+                figure.name,
+                figure.truth,
+                figure.value,
+                figure.std,
+                figure.pull
+            );
+        }
+    }
+    text
+}
+
+/// Reads notes: one line a case, `campaign-0042: text`; lines that start with # are remarks. They hold for one
+/// sealed truth only, whose hash the first line names; those of another are none.
+pub fn notes(path: &Path, hash: &str) -> Vec<(String, String)> {
+    let Ok(text) = fs::read_to_string(path) else {
+        return Vec::new();
+    };
+    let mut lines = text.lines().filter(|line| !line.starts_with('#'));
+    if lines.next().map(str::trim) != Some(hash) {
+        return Vec::new();
+    }
+    lines
+        .filter_map(|line| {
+            let (name, note) = line.split_once(':')?;
+            Some((name.trim().to_owned(), note.trim().to_owned()))
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn notes_hold_for_their_own_truth_only() {
+        let directory = tempfile::tempdir().unwrap();
+        let path = directory.path().join("causes.txt");
+        fs::write(
+            &path,
+            "# read by hand\nabc\ncampaign-0007: a dead zone: no lag\n",
+        )
+        .unwrap();
+        assert_eq!(
+            notes(&path, "abc"),
+            [("campaign-0007".to_owned(), "a dead zone: no lag".to_owned())]
+        );
+        assert!(notes(&path, "abd").is_empty());
+        assert!(notes(&directory.path().join("none"), "abc").is_empty());
+    }
+}
