@@ -72,9 +72,10 @@ enum Command {
     },
     /// Build, check, and put the image onto a chip by probe-rs.
     Flash,
-    /// The sealed trial of the diagnosis: conceal effects, diagnose, open, judge, write docs/trials.md.
+    /// The sealed trial of the diagnosis: conceal effects, diagnose, open, judge, hold against bars.
     ///
-    /// Arguments go to `sealed-trial run`, among them --seed, --small, --scale, --jobs and --out; --help tells all.
+    /// --report writes docs/trials.md and docs/reality.md, of a clean commit and a fresh seed from 20,000; --small plays a tenth
+    /// and holds its figures against .ci/trial.toml. Further arguments go to `sealed-trial run`; --help tells all.
     #[command(disable_help_flag = true)]
     Trial {
         #[arg(trailing_var_arg = true, allow_hyphen_values = true)]

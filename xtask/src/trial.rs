@@ -1,11 +1,35 @@
 //! `cargo xtask trial`: the sealed trial of the diagnosis, from building the tool to the pages.
 
-use anyhow::Result;
+use std::path::PathBuf;
+use std::process::Command;
+
+use anyhow::{Context, Result, bail};
 
 use crate::step::{cargo, command, root, run};
 
-/// Builds tool and trial in release, then plays the trial with the given further arguments.
+/// The engine that later ones are held against, by its commit.
+const RIVAL: &str = "6b77987";
+/// Continuous integration's own seed.
+const SMALL_SEED: &str = "1500";
+
+/// Builds tool and trial in release, then plays the trial with the given further arguments. `--report` is for the
+/// pages: of a commit and nothing else, with the earlier engine on the same files.
 pub fn play(arguments: &[String]) -> Result<()> {
+    let report = arguments.iter().any(|argument| argument == "--report");
+    let small = arguments.iter().any(|argument| argument == "--small");
+    let mut further: Vec<String> = arguments
+        .iter()
+        .filter(|argument| *argument != "--report")
+        .cloned()
+        .collect();
+    if small && !further.iter().any(|argument| argument == "--seed") {
+        further.extend(["--seed".into(), SMALL_SEED.into()]);
+    }
+    if report {
+        further.extend(["--commit".into(), clean_commit()?]);
+        further.extend(["--rival".into(), rival()?.display().to_string()]);
+        further.extend(["--out".into(), "docs".into()]);
+    }
     run(
         "tool and trial, in release",
         cargo(&[
@@ -19,24 +43,91 @@ pub fn play(arguments: &[String]) -> Result<()> {
             "sealed-trial",
         ]),
     )?;
-    let target = std::env::var_os("CARGO_TARGET_DIR")
-        .map_or_else(|| root().join("target"), |folder| root().join(folder));
-    let program = |name: &str| {
-        target
-            .join("release")
-            .join(format!("{name}{}", std::env::consts::EXE_SUFFIX))
-            .display()
-            .to_string()
-    };
     let mut trial = command(
-        &program("sealed-trial"),
-        &["run", "--muslip", &program("muslip")],
+        &program(&target(), "sealed-trial"),
+        &["run", "--muslip", &program(&target(), "muslip")],
     );
-    trial.args(arguments);
+    trial.args(further);
     run("sealed trial", trial)
 }
 
-/// The small trial: a few campaigns of a development seed, with loose bars that must hold.
+/// The small trial: continuous integration's seed, figures held by a ratchet.
 pub fn small() -> Result<()> {
-    play(&["--small".into(), "--seed".into(), "41".into()])
+    play(&["--small".into()])
+}
+
+fn target() -> PathBuf {
+    std::env::var_os("CARGO_TARGET_DIR")
+        .map_or_else(|| root().join("target"), |folder| root().join(folder))
+}
+
+fn program(target: &std::path::Path, name: &str) -> String {
+    target
+        .join("release")
+        .join(format!("{name}{}", std::env::consts::EXE_SUFFIX))
+        .display()
+        .to_string()
+}
+
+/// What a git command prints.
+fn git(arguments: &[&str]) -> Result<String> {
+    let output = command("git", arguments)
+        .output()
+        .context("cannot start git")?;
+    if !output.status.success() {
+        bail!(
+            "git {}: {}",
+            arguments.join(" "),
+            String::from_utf8_lossy(&output.stderr).trim()
+        );
+    }
+    Ok(String::from_utf8_lossy(&output.stdout).trim().to_owned())
+}
+
+/// The commit that is checked out, where nothing differs from it but pages that this command writes.
+fn clean_commit() -> Result<String> {
+    let changed = git(&["status", "--porcelain", "--", ".", ":!docs"])?;
+    if !changed.is_empty() {
+        bail!("figures are reported of a commit: commit first\n{changed}");
+    }
+    git(&["rev-parse", "HEAD"])
+}
+
+/// The earlier engine, built from its commit in a tree of its own beside the trials.
+fn rival() -> Result<PathBuf> {
+    let folder = target().join("trial").join(format!("engine-{RIVAL}"));
+    let built = folder.join("target");
+    let path = PathBuf::from(program(&built, "muslip"));
+    if path.exists() {
+        return Ok(path);
+    }
+    if !folder.exists() {
+        git(&["worktree", "prune"])?;
+        git(&[
+            "worktree",
+            "add",
+            "--detach",
+            &folder.display().to_string(),
+            RIVAL,
+        ])
+        .with_context(|| {
+            format!("the earlier engine's commit {RIVAL} is needed: fetch the whole history")
+        })?;
+    }
+    let mut build = Command::new(std::env::var("CARGO").unwrap_or_else(|_| "cargo".into()));
+    build
+        .args([
+            "build",
+            "--release",
+            "--locked",
+            "--quiet",
+            "--package",
+            "host-sim",
+        ])
+        .arg("--target-dir")
+        .arg(&built)
+        .current_dir(&folder)
+        .stdin(std::process::Stdio::null());
+    run(&format!("engine of commit {RIVAL}, in release"), build)?;
+    Ok(path)
 }

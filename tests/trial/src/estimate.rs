@@ -14,6 +14,7 @@ use crate::generate::campaign::{Order, make_with_twin};
 use crate::generate::effect::{Effect, Scale};
 use crate::generate::files::recording;
 use crate::generate::form::{Form, mechanism};
+use crate::generate::instrument::ChainKind;
 use crate::generate::rig::Rig;
 use crate::generate::tyre::{Contact, curve_scaling};
 use crate::share::quantile;
@@ -138,6 +139,7 @@ fn campaign(
             forms: vec![form],
             strength: vec![size],
             null: None,
+            chain: ChainKind::Ideal,
         };
         match make_with_twin(&name, Draw::new(key, &[attempt]).seed(), &order) {
             Ok(campaign) => {

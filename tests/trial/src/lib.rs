@@ -22,5 +22,6 @@ pub use estimate::{Compensation, compensation};
 pub use generate::files::generate;
 pub use generate::strata::Request;
 pub use judge::score::{Report, ScoreRequest, score};
+pub use real::Study;
 pub use report::trial::{Trial, only_measured, trial};
 pub use tool::Tool;

@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use sealed_trial::{Report, Request, ScoreRequest, Tool, generate, score};
 use serde_json::{Value, json};
 
-const IDS: [&str; 27] = [
+const IDS: [&str; 29] = [
     "curve_shape",
     "load_sensitivity",
     "speed_sensitivity",
@@ -30,6 +30,8 @@ const IDS: [&str; 27] = [
     "force_saturation",
     "run_out",
     "encoder_ripple",
+    "vehicle_speed_delay",
+    "wheel_speed_delay",
     "aero_drag",
     "grade_or_drive",
     "vehicle_inertia",
@@ -42,15 +44,21 @@ const IDS: [&str; 27] = [
 fn campaigns(directory: &Path) {
     let request = |stratum: &str, count: usize, mechanism: Option<&str>| Request {
         stratum: stratum.into(),
+        real_chain: false,
         count,
         mechanism: mechanism.map(Into::into),
-        strength: None,
+        strength: mechanism.map(|_| 1.0),
     };
     let wanted = [
         request("null", 3, None),
         request("single", 2, Some("force_delay")),
         request("single", 1, Some("surface_patch")),
         request("outside", 2, None),
+        request("chain", 13, None),
+        Request {
+            real_chain: true,
+            ..request("null", 2, None)
+        },
     ];
     generate(directory, &wanted, 77).unwrap();
 }
@@ -98,7 +106,16 @@ fn diagnosis(truth: Option<&Value>) -> Value {
         .iter()
         .map(|id| json!({"id": id, "identifiable": true, "minimum_detectable": null}))
         .collect();
-    json!({"schema": "muslip.diagnosis/1", "verdict": verdict, "recordings": [], "noise": {}, "where": places, "regions": [],
+    let chain: Vec<Value> = truth
+        .and_then(|truth| truth["findings"].as_array())
+        .into_iter()
+        .flatten()
+        .map(|finding| {
+            json!({"recording": "*", "channel": finding["channel"], "finding": finding["finding"],
+                "value": finding["value"], "std": 0.0, "unit": "", "statement": "as the sealed file says"})
+        })
+        .collect();
+    json!({"schema": "muslip.diagnosis/1", "verdict": verdict, "chain": chain, "recordings": [], "noise": {}, "where": places, "regions": [],
         "base": {"peak_friction": {"value": 0.8, "std": 0.01}, "critical_slip": {"value": 0.1, "std": 0.01}},
         "mechanisms": mechanisms, "unexplained": unexplained, "looked_for": looked, "data_faults": [], "fit": {}})
 }
@@ -170,13 +187,23 @@ fn a_tool_that_knows_the_truth_gets_full_marks_and_a_blind_one_none() {
     assert_eq!(knowing, "", "nothing may be counted against the truth");
     let report = judged(directory.path(), false);
     let lines = report.lines(false);
-    assert_eq!(lines.lines().count(), 8, "{lines}");
+    assert_eq!(lines.lines().count(), 23, "{lines}");
     for line in lines.lines() {
-        let fails = line.contains("single") && !line.contains("@0.3") || line.contains("outside");
+        let fails = [" single ", " outside ", " chain "]
+            .iter()
+            .any(|stratum| line.contains(stratum));
         assert_eq!(line.starts_with("FAIL"), fails, "{line}");
     }
-    assert!(report.text().contains("right mechanism first"));
-    assert!(report.text().contains("false alarms on null campaigns"));
+    assert!(
+        report
+            .text()
+            .contains("one effect from 0.6 sigma, ideal sensors: right first")
+    );
+    assert!(
+        report
+            .text()
+            .contains("nothing missing, real chains: false physics")
+    );
 }
 
 #[test]
@@ -210,6 +237,7 @@ fn the_same_seed_gives_the_same_seal() {
     let (one, two) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
     let request = [Request {
         stratum: "pair".into(),
+        real_chain: false,
         count: 2,
         mechanism: None,
         strength: None,

@@ -3,6 +3,7 @@
 
 use crate::generate::effect::{Effect, Scale};
 use crate::generate::form::Form;
+use crate::generate::instrument::Seen;
 use crate::generate::sim::{Stretch, derivative};
 
 /// Readings of one stretch at its sample times, free of random noise.
@@ -50,44 +51,118 @@ pub struct Chain<'a> {
 impl Chain<'_> {
     /// All channels at the sample times.
     pub fn read(&self, stretch: &Stretch, times: &[f64]) -> Readings {
-        let drag = self.drag(stretch);
         let pick = |values: &[f64]| sample(values, stretch, times);
-        let mut wheel = pick(&stretch.wheel);
-        let mut speed = pick(&stretch.speed);
-        let mut load = pick(&stretch.load);
-        for effect in self.effects {
-            match effect.form {
-                Form::RippleSine => {
-                    let angle = pick(&stretch.angle);
-                    for (value, angle) in wheel.iter_mut().zip(angle) {
-                        *value *= ripple(effect, angle);
-                    }
-                }
-                Form::RippleTiming => {
-                    wheel = pulse_timing(effect, stretch, times, self.scale.rate_hz)
-                }
-                Form::OutSpeedBand => {
-                    for value in &mut speed {
-                        *value *= 1.0
-                            + effect.a * (-((*value - effect.p[0]) / effect.p[1]).powi(2)).exp();
-                    }
-                }
-                Form::OutLoadLag => load = pick(&low_pass(&stretch.load, stretch.dt, effect.a)),
-                _ => {}
-            }
-        }
+        let timing = self
+            .effects
+            .iter()
+            .find(|effect| effect.form == Form::RippleTiming);
         Readings {
             time: times.to_vec(),
-            wheel,
-            speed,
-            drag: pick(&drag),
-            load,
+            wheel: match timing {
+                Some(effect) => pulse_timing(effect, stretch, times, self.scale.rate_hz),
+                None => pick(&self.wheel(stretch)),
+            },
+            speed: pick(&self.speed(stretch)),
+            drag: pick(&self.drag(stretch)),
+            load: pick(&self.load(stretch)),
             torque: pick(&stretch.torque),
             command: pick(&stretch.command),
             column: pick(&stretch.column),
             angle: pick(&stretch.angle),
             distance: pick(&stretch.distance),
         }
+    }
+
+    /// All channels on the fine grid, for instruments of their own.
+    pub fn seen(&self, stretch: &Stretch, pressure: bool) -> Seen {
+        let angle: Vec<f64> = stretch
+            .angle
+            .iter()
+            .map(|angle| angle + self.effects.iter().map(|e| shift(e, *angle)).sum::<f64>())
+            .collect();
+        Seen {
+            start: stretch.start,
+            dt: stretch.dt,
+            wheel: self.wheel(stretch),
+            angle: self.late_wheel(&angle, stretch.dt),
+            speed: self.speed(stretch),
+            distance: self.late_vehicle(&stretch.distance, stretch),
+            drag: self.drag(stretch),
+            load: self.load(stretch),
+            brake: if pressure {
+                stretch.command.clone()
+            } else {
+                stretch.torque.clone()
+            },
+        }
+    }
+
+    /// The wheel's speed as its sensor meets it.
+    fn wheel(&self, stretch: &Stretch) -> Vec<f64> {
+        let mut wheel = stretch.wheel.clone();
+        for effect in self.effects {
+            if matches!(effect.form, Form::RippleSine | Form::RippleTiming) {
+                for (value, angle) in wheel.iter_mut().zip(&stretch.angle) {
+                    *value *= ripple(effect, *angle);
+                }
+            }
+        }
+        self.late_wheel(&wheel, stretch.dt)
+    }
+
+    fn late_wheel(&self, values: &[f64], dt: f64) -> Vec<f64> {
+        let mut out = values.to_vec();
+        for effect in self.effects {
+            match effect.form {
+                Form::WheelLate => out = later(&out, dt, effect.a),
+                Form::WheelLateWindow => out = moving_average(&out, dt, 2.0 * effect.a),
+                _ => {}
+            }
+        }
+        out
+    }
+
+    /// The vehicle's speed as its sensor meets it.
+    fn speed(&self, stretch: &Stretch) -> Vec<f64> {
+        let mut speed = stretch.speed.clone();
+        for effect in self.effects {
+            if effect.form == Form::OutSpeedBand {
+                for value in &mut speed {
+                    *value *=
+                        1.0 + effect.a * (-((*value - effect.p[0]) / effect.p[1]).powi(2)).exp();
+                }
+            }
+        }
+        self.late_vehicle(&speed, stretch)
+    }
+
+    fn late_vehicle(&self, values: &[f64], stretch: &Stretch) -> Vec<f64> {
+        let mut out = values.to_vec();
+        for effect in self.effects {
+            match effect.form {
+                Form::VehicleLate => out = later(&out, stretch.dt, effect.a),
+                // A hold is late by half its length on the mean: the rest is a pure delay.
+                Form::VehicleLateHeld => {
+                    let hold = (HELD_SHARE * 2.0 * effect.a / stretch.dt).max(1.0);
+                    let before = later(&out, stretch.dt, (1.0 - HELD_SHARE) * effect.a);
+                    for (index, value) in out.iter_mut().enumerate() {
+                        *value = at(&before, (index as f64 / hold).floor() * hold);
+                    }
+                }
+                _ => {}
+            }
+        }
+        out
+    }
+
+    fn load(&self, stretch: &Stretch) -> Vec<f64> {
+        let mut load = stretch.load.clone();
+        for effect in self.effects {
+            if effect.form == Form::OutLoadLag {
+                load = low_pass(&stretch.load, stretch.dt, effect.a);
+            }
+        }
+        load
     }
 
     /// The load cell's reading on the fine grid.
@@ -230,6 +305,29 @@ pub fn ripple(effect: &Effect, angle: f64) -> f64 {
         0.0
     };
     1.0 + effect.a * ((angle + effect.p[0]).cos() + second * (2.0 * angle + effect.p[2]).cos())
+}
+
+/// The share of a held speed's delay that is the hold's.
+const HELD_SHARE: f64 = 0.3;
+
+/// By how much the angle that a rippling encoder shows is ahead of the wheel's.
+fn shift(effect: &Effect, angle: f64) -> f64 {
+    match effect.form {
+        Form::RippleSine => {
+            effect.a
+                * ((angle + effect.p[0]).sin()
+                    + 0.5 * effect.p[1] * (2.0 * angle + effect.p[2]).sin())
+        }
+        Form::RippleTiming => effect.a * (angle + effect.p[0]).sin(),
+        _ => 0.0,
+    }
+}
+
+/// The same signal so much later, the first value held before it.
+fn later(values: &[f64], dt: f64, delay: f64) -> Vec<f64> {
+    (0..values.len())
+        .map(|index| at(values, index as f64 - delay / dt))
+        .collect()
 }
 
 /// Value at a fractional index, linear between points, held beyond the ends.

@@ -2,10 +2,16 @@
 
 use rayon::prelude::*;
 
+use crate::draw::Draw;
 use crate::generate::campaign::{Campaign, NULL_KINDS, NullKind, Order, make};
+use crate::generate::form::Needs;
 use crate::generate::form::{OUTSIDE, VOCABULARY};
-use crate::generate::measure::{refit, residual, rms};
+use crate::generate::instrument::finding::{FINDING_KINDS, FindingKind};
+use crate::generate::instrument::{ChainKind, Instruments};
+use crate::generate::measure::{refit, residual, rms, usable};
 use crate::generate::noise::Written;
+use crate::generate::plan::Plan;
+use crate::generate::rig::Rig;
 
 fn null(kind: NullKind, seed: u64) -> Campaign {
     let order = Order {
@@ -13,6 +19,7 @@ fn null(kind: NullKind, seed: u64) -> Campaign {
         forms: vec![],
         strength: vec![],
         null: Some(kind),
+        chain: ChainKind::Ideal,
     };
     make("campaign-0000", seed, &order).unwrap()
 }
@@ -118,6 +125,7 @@ fn every_form_leaves_its_balance_off_by_the_ordered_size() {
             forms: vec![*form],
             strength: vec![1.0],
             null: None,
+            chain: ChainKind::Ideal,
         };
         let campaign = make("campaign-0000", 17, &order).unwrap();
         let truth = &campaign.truth;
@@ -170,6 +178,7 @@ fn the_oracle_beats_the_base_where_the_effect_is_large() {
             forms: vec![form],
             strength: vec![4.0],
             null: None,
+            chain: ChainKind::Ideal,
         };
         // A single run may lie where the effect happens to vanish.
         let (mut floor, mut base) = (0.0, 0.0);
@@ -184,4 +193,97 @@ fn the_oracle_beats_the_base_where_the_effect_is_large() {
         }
         assert!(floor < 0.5 * base, "{form:?}: floor {floor} base {base}");
     }
+}
+
+fn through(chain: ChainKind, seed: u64) -> Campaign {
+    let order = Order {
+        stratum: "null".into(),
+        forms: vec![],
+        strength: vec![],
+        null: Some(NullKind::RealChain),
+        chain,
+    };
+    make("campaign-0000", seed, &order).unwrap()
+}
+
+#[test]
+fn nothing_is_missing_behind_a_real_chain_and_its_errors_have_the_size_that_counts() {
+    (0..12u64).into_par_iter().for_each(|seed| {
+        let campaign = through(ChainKind::Real, 300 + seed);
+        let truth = &campaign.truth;
+        for (balance, size) in &truth.size {
+            assert!(*size < 0.06, "seed {seed}: {balance} off by {size} sigma");
+        }
+        assert!(truth.intervals.is_empty());
+        assert!(truth.findings.is_empty() && truth.concealed.is_empty());
+        let errors: Vec<f64> = campaign
+            .fit
+            .iter()
+            .flat_map(|run| {
+                (0..run.reading.len())
+                    .filter(|index| usable(&truth.rig, &run.clean, *index))
+                    .map(|index| run.written.drag[index] - run.reading[index])
+                    .collect::<Vec<_>>()
+            })
+            .collect();
+        let ratio = rms(errors.iter()) / truth.rig.sigmas.drag_force_n;
+        // Slow noise differs from ride to ride.
+        assert!((0.5..2.0).contains(&ratio), "seed {seed}: {ratio}");
+        // What the chain does to the drag is small beside the drag, but it is something.
+        let off: Vec<f64> = campaign
+            .fit
+            .iter()
+            .flat_map(|run| {
+                run.reading
+                    .iter()
+                    .zip(&run.clean.drag)
+                    .map(|(a, b)| a - b)
+                    .collect::<Vec<_>>()
+            })
+            .collect();
+        assert!(rms(off.iter()) < 0.4 * truth.rig.peak_drag_n());
+    });
+}
+
+#[test]
+fn sensors_of_every_sort_meet_each_other_and_fresh_runs_stand_everywhere() {
+    let mut met = std::collections::BTreeSet::new();
+    let mut places = std::collections::BTreeSet::new();
+    for seed in 0..300 {
+        let mut draw = Draw::new(seed, &[1]);
+        let rig = Rig::draw(Needs::default(), &mut draw);
+        let chain = Instruments::draw(ChainKind::Real, &rig, &mut draw);
+        met.insert((chain.wheel.word(), chain.vehicle.word()));
+        let plan = Plan::draw(Needs::default(), &rig, false, &mut draw);
+        places.extend(plan.fresh.map(|index| plan.place(index)));
+        assert!(plan.fitted().count() + 2 == plan.runs.len());
+    }
+    assert_eq!(met.len(), 3 * 4, "{met:?}");
+    assert_eq!(places.len(), 3, "{places:?}");
+}
+
+#[test]
+fn an_effect_of_the_chain_stands_alone_in_its_campaign() {
+    FINDING_KINDS.into_par_iter().for_each(|kind| {
+        let campaign = through(ChainKind::Only(kind), 500);
+        let truth = &campaign.truth;
+        assert!(
+            truth
+                .findings
+                .iter()
+                .all(|finding| finding.value.is_finite()),
+            "{kind:?}: {:?}",
+            truth.findings
+        );
+        // Runs do not differ, and ideal readings satisfy every balance.
+        assert!(
+            truth.size.iter().all(|(_, size)| *size < 0.06),
+            "{kind:?}: {:?}",
+            truth.size
+        );
+        assert!(truth.spread.iter().all(|spread| spread.friction == 0.0));
+        if kind == FindingKind::LeakingColumn {
+            assert!(truth.findings[0].value > 0.95, "{:?}", truth.findings);
+        }
+    });
 }

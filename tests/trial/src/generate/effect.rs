@@ -49,10 +49,12 @@ impl Scale {
     /// The typical figures of a rig under a plan.
     pub fn of(rig: &Rig, plan: &Plan) -> Scale {
         let shortest = |f: &dyn Fn(&crate::generate::plan::RunPlan) -> f64| {
-            plan.fit.iter().map(f).fold(f64::INFINITY, f64::min)
+            plan.fitted()
+                .map(|run| f(run.1))
+                .fold(f64::INFINITY, f64::min)
         };
         let slow = if rig.coasting { 0.6 } else { 1.0 };
-        let last = plan.fit.last();
+        let last = plan.fitted().last().map(|run| run.1);
         Scale {
             load: rig.mean_load_n,
             speed: rig.mean_speed_m_s,
@@ -66,7 +68,7 @@ impl Scale {
                 slow * run.duration_s * run.speed.first().map_or(1.0, |k| k.1)
             }),
             duration: shortest(&|run| run.duration_s),
-            runs: plan.fit.len() as f64,
+            runs: plan.runs.len() as f64,
             clock: last.map_or(1.0, |run| run.clock_s + run.duration_s),
             rate_hz: rig.rate_hz,
         }
@@ -174,6 +176,8 @@ impl Effect {
             }
             HysteresisPlay => (0.0, 0.5),
             DelayPure | DelayHold => (0.0, 0.08),
+            VehicleLate | VehicleLateHeld => (0.0, 0.4),
+            WheelLate | WheelLateWindow => (0.0, 0.08),
             LagOnePole | LagMovingAverage => (0.0, 0.1),
             LagTwoPoles => {
                 p[0] = draw.between(0.65, 0.88);

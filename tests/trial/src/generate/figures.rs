@@ -2,19 +2,26 @@
 //! wherever the truth form has no such figure of its own.
 
 use crate::generate::campaign::{Concealed, Figure};
-use crate::generate::chain::{Readings, saturation_limit, share};
+use crate::generate::chain::{saturation_limit, share};
 use crate::generate::effect::{Effect, Scale};
 use crate::generate::form::{Form, OUTSIDE};
 use crate::generate::rig::Rig;
 use crate::generate::sim::{Motion, Stretch, bearing};
-use crate::generate::tyre::{Contact, radius_change, slip_length, static_curve};
+use crate::generate::tyre::{Contact, Wear, radius_change, slip_length, static_curve};
+
+/// A run as it went, and where it stands in the campaign.
+pub struct Ridden<'a> {
+    pub motion: &'a Motion,
+    pub index: usize,
+    pub wear_before: Wear,
+}
 
 /// Everything that the truth file says of one effect.
 pub fn concealed(
     effect: &Effect,
     rig: &Rig,
     scale: &Scale,
-    runs: &[(&Motion, &Readings)],
+    runs: &[Ridden<'_>],
     column: Option<&str>,
 ) -> Concealed {
     let accept = match effect.form {
@@ -54,11 +61,12 @@ pub fn concealed(
     }
 }
 
-fn figures(
+/// The effect's parameters in the contract's definition.
+pub fn figures(
     effect: &Effect,
     rig: &Rig,
     scale: &Scale,
-    runs: &[(&Motion, &Readings)],
+    runs: &[Ridden<'_>],
 ) -> Vec<Figure> {
     use Form::*;
     let (a, p) = (effect.a, &effect.p);
@@ -68,6 +76,7 @@ fn figures(
             name: name.to_owned(),
             unit: unit.to_owned(),
             values,
+            attainable_std: None,
         }]
     };
     match effect.form {
@@ -150,22 +159,17 @@ fn figures(
         }
         PatchHard | PatchSmooth | PatchSeveral => one("start", "m", vec![p[0]]),
         WearEnergy | WearRun | WearDistance => {
-            let level = |index: usize| {
-                let (motion, before) = (
-                    runs[index].0,
-                    index
-                        .checked_sub(1)
-                        .map_or(crate::generate::tyre::Wear::default(), |i| runs[i].0.wear),
-                );
+            let level = |run: &Ridden<'_>| {
+                let (after, before) = (run.motion.wear, run.wear_before);
                 let (energy, slid) = (
-                    0.5 * (motion.wear.energy + before.energy),
-                    0.5 * (motion.wear.slid + before.slid),
+                    0.5 * (after.energy + before.energy),
+                    0.5 * (after.slid + before.slid),
                 );
                 match effect.form {
                     WearEnergy => {
                         (-a * energy / (0.25 * scale.power * scale.duration * scale.runs)).exp()
                     }
-                    WearRun => 1.0 - a * index as f64 / (scale.runs - 1.0).max(1.0),
+                    WearRun => 1.0 - a * run.index as f64 / (scale.runs - 1.0).max(1.0),
                     _ => {
                         1.0 - a
                             * (1.0
@@ -177,7 +181,10 @@ fn figures(
             one(
                 "friction_loss",
                 "1",
-                vec![1.0 - level(runs.len() - 1) / level(0)],
+                match (runs.first(), runs.last()) {
+                    (Some(first), Some(last)) => vec![1.0 - level(last) / level(first)],
+                    _ => vec![],
+                },
             )
         }
         HysteresisDahl | HysteresisSign => one("loop_share", "1", vec![a]),
@@ -190,7 +197,9 @@ fn figures(
             });
             one("loop_share", "1", vec![-share, share])
         }
-        DelayPure | DelayHold => one("delay", "s", vec![a]),
+        DelayPure | DelayHold | VehicleLate | VehicleLateHeld | WheelLate | WheelLateWindow => {
+            one("delay", "s", vec![a])
+        }
         LagOnePole | LagTwoPoles | LagMovingAverage => one("time_constant", "s", vec![a]),
         ResonanceMode | ResonanceShare => {
             let mut both = one("frequency", "Hz", vec![1.0 / a]);
@@ -261,7 +270,7 @@ fn figures(
         FadeTemperature | FadeEnergy => one(
             "torque_loss",
             "1",
-            vec![runs.iter().map(|run| run.0.torque_loss).fold(0.0, f64::max)],
+            vec![runs.iter().map(|run| run.motion.torque_loss).fold(0.0, f64::max)],
         ),
         BrakeLagOne | BrakeLagTwo | BrakeLagDead => one("time_constant", "s", vec![a]),
         InertiaConstant => one("inertia", "kg m2", vec![rig.inertia_kg_m2 * (1.0 + a)]),
@@ -284,9 +293,9 @@ fn main_stretch(motion: &Motion) -> Option<&Stretch> {
     motion.stretches.last()
 }
 
-fn mean(runs: &[(&Motion, &Readings)], value: impl Fn(&Stretch, usize) -> Option<f64>) -> f64 {
+fn mean(runs: &[Ridden<'_>], value: impl Fn(&Stretch, usize) -> Option<f64>) -> f64 {
     let (mut sum, mut count) = (0.0, 0.0);
-    for stretch in runs.iter().filter_map(|run| main_stretch(run.0)) {
+    for stretch in runs.iter().filter_map(|run| main_stretch(run.motion)) {
         for i in (0..stretch.len()).step_by(20) {
             if let Some(value) = value(stretch, i) {
                 sum += value;
@@ -299,12 +308,12 @@ fn mean(runs: &[(&Motion, &Readings)], value: impl Fn(&Stretch, usize) -> Option
 
 /// Least-squares slope over braking samples, weighted by drag squared.
 fn slope(
-    runs: &[(&Motion, &Readings)],
+    runs: &[Ridden<'_>],
     rig: &Rig,
     point: &dyn Fn(&Stretch, usize) -> (f64, f64),
 ) -> f64 {
     let (mut w, mut wx, mut wy, mut wxx, mut wxy) = (0.0, 0.0, 0.0, 0.0, 0.0);
-    for stretch in runs.iter().filter_map(|run| main_stretch(run.0)) {
+    for stretch in runs.iter().filter_map(|run| main_stretch(run.motion)) {
         for i in (0..stretch.len()).step_by(20) {
             if stretch.drag[i] < 0.2 * rig.peak_drag_n() || stretch.speed[i] < rig.slowest_m_s() {
                 continue;

@@ -132,18 +132,21 @@ fn file(directory: &Path, name: &str, campaign: &Campaign) -> Result<()> {
 }
 
 fn reading(recorded: &Recorded, truth: &Truth) -> String {
-    let mut text = String::from("time_s,drag_force_n,scored\n");
+    let mut text = String::from("time_s,drag_force_n,written_drag_force_n,scored\n");
     let clean = &recorded.clean;
     for i in 0..clean.time.len() {
         let scored = u8::from(crate::generate::measure::usable(&truth.rig, clean, i));
-        let _ = writeln!(text, "{:.6},{:.6},{scored}", clean.time[i], clean.drag[i]);
+        let _ = writeln!(
+            text,
+            "{:.6},{:.6},{:.6},{scored}",
+            clean.time[i], recorded.reading[i], recorded.written.drag[i]
+        );
     }
     text
 }
 
-/// A recording as its logger writes it: some with remarks on top, some with the columns in an
+/// A recorded run as the file that a user would have: some loggers put remarks on top, some have the columns in an
 /// order of their own.
-/// A recorded run as the file that a user would have.
 pub fn recording(truth: &Truth, recorded: &Recorded, with_drag: bool) -> String {
     let (rig, column) = (&truth.rig, truth.column.as_deref());
     let mut habit = Draw::new(truth.seed, &[0x1066e5]);

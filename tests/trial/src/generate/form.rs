@@ -43,6 +43,10 @@ pub enum Form {
     HysteresisPlay,
     DelayPure,
     DelayHold,
+    VehicleLate,
+    VehicleLateHeld,
+    WheelLate,
+    WheelLateWindow,
     LagOnePole,
     LagTwoPoles,
     LagMovingAverage,
@@ -104,7 +108,7 @@ pub enum Form {
 use Form as F;
 
 /// The vocabulary of the contract, each with its balance and its truth forms.
-pub const VOCABULARY: [(&str, &str, &[Form]); 27] = [
+pub const VOCABULARY: [(&str, &str, &[Form]); 29] = [
     (
         "curve_shape",
         "tyre",
@@ -203,6 +207,16 @@ pub const VOCABULARY: [(&str, &str, &[Form]); 27] = [
         &[F::RunOutLoad, F::RunOutRadius, F::RunOutAdditive],
     ),
     ("encoder_ripple", "tyre", &[F::RippleSine, F::RippleTiming]),
+    (
+        "vehicle_speed_delay",
+        "tyre",
+        &[F::VehicleLate, F::VehicleLateHeld],
+    ),
+    (
+        "wheel_speed_delay",
+        "tyre",
+        &[F::WheelLate, F::WheelLateWindow],
+    ),
     ("aero_drag", "vehicle", &[F::AeroStill, F::AeroHeadwind]),
     (
         "grade_or_drive",
@@ -259,6 +273,8 @@ pub const OUTSIDE: [(Form, &str, &[&str]); 17] = [
 /// from within one group.
 const LOOKALIKES: [&[&str]; 6] = [
     &[
+        "vehicle_speed_delay",
+        "wheel_speed_delay",
         "force_delay",
         "force_lag",
         "relaxation_length",
@@ -336,6 +352,8 @@ impl Form {
             | F::MassFuel
             | F::GainConstant
             | F::GainBent
+            | F::VehicleLate
+            | F::VehicleLateHeld
             | F::OutColumnWind => {
                 needs.coasting = true;
             }
@@ -382,6 +400,10 @@ impl Form {
                 | F::RelaxLoadSlip
                 | F::DelayPure
                 | F::DelayHold
+                | F::VehicleLate
+                | F::VehicleLateHeld
+                | F::WheelLate
+                | F::WheelLateWindow
                 | F::LagOnePole
                 | F::LagTwoPoles
                 | F::LagMovingAverage
@@ -451,6 +473,14 @@ impl Form {
                 | F::OutSlipRate
                 | F::OutColumnWind
                 | F::OutColumnOil
+        )
+    }
+
+    /// Whether the effect depends on how many runs were driven before.
+    pub fn of_the_order(self) -> bool {
+        matches!(
+            self,
+            F::WearEnergy | F::WearRun | F::WearDistance | F::MassFuel | F::DriftClock
         )
     }
 

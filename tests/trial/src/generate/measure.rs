@@ -287,8 +287,14 @@ pub fn filled(values: &[f64]) -> Vec<f64> {
     out
 }
 
-/// Mean squared error of the base driven by what was written.
-pub fn base_error(rig: &Rig, base: Base, clean: &Readings, written: &Written) -> f64 {
+/// Mean squared error of the base driven by what was written, against the load cell's `reading` without random noise.
+pub fn base_error(
+    rig: &Rig,
+    base: Base,
+    clean: &Readings,
+    reading: &[f64],
+    written: &Written,
+) -> f64 {
     let (speed, wheel, load) = (
         filled(&written.speed),
         filled(&written.wheel),
@@ -297,7 +303,7 @@ pub fn base_error(rig: &Rig, base: Base, clean: &Readings, written: &Written) ->
     let errors: Vec<f64> = (0..clean.time.len())
         .filter(|&i| usable(rig, clean, i))
         .map(|i| {
-            clean.drag[i]
+            reading[i]
                 - load[i]
                     * base.peak_friction
                     * law(slip(rig, speed[i], wheel[i]) / base.critical_slip)

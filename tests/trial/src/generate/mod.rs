@@ -4,9 +4,9 @@
 //! | --- | --- |
 //! | which campaigns | [`strata`], [`form`] |
 //! | rig, programme, motion | [`rig`], [`plan`], [`sim`], [`tyre`], [`effect`] |
-//! | what the instruments make of it | [`chain`], [`noise`] |
+//! | what the instruments make of it | [`chain`], [`noise`], [`instrument`] |
 //! | one campaign, its files | [`campaign`], [`files`] |
-//! | its truth | [`figures`], [`measure`], [`oracle`] |
+//! | its truth | [`figures`], [`measure`], [`oracle`], [`attainable`] |
 
 /// Declares the modules and keeps their text, so that campaigns of another generator can be told.
 macro_rules! modules {
@@ -18,9 +18,11 @@ macro_rules! modules {
 }
 
 modules!(
-    campaign, chain, effect, figures, files, form, measure, noise, oracle, plan, rig, sim, strata,
-    tyre,
+    attainable, campaign, chain, effect, figures, files, form, measure, noise, oracle, plan, rig,
+    sim, strata, tyre,
 );
+
+pub mod instrument;
 
 #[cfg(test)]
 mod checks;

@@ -126,29 +126,35 @@ pub fn write(rig: &Rig, readings: &Readings, errors: &Errors, draw: &mut Draw) -
             step(&mut written.load, 2.0 * rig.sigmas.normal_force_n);
             step(&mut written.wheel, 1.0 * rig.sigmas.wheel_speed_rad_s);
         }
-        NoiseKind::MissingCells => {
-            let share = draw.between(0.002, 0.02);
-            for values in [
-                &mut written.wheel,
-                &mut written.speed,
-                &mut written.drag,
-                &mut written.load,
-            ] {
-                let mut left = 0;
-                for value in values.iter_mut() {
-                    if left == 0 && draw.chance(share / 4.0) {
-                        left = draw.whole(1, 6);
-                    }
-                    if left > 0 {
-                        left -= 1;
-                        *value = f64::NAN;
-                    }
-                }
-            }
-        }
         _ => {}
     }
+    drop_cells(rig, &mut written, draw);
     written
+}
+
+/// Leaves cells empty where the rig's recorder does.
+pub fn drop_cells(rig: &Rig, written: &mut Written, draw: &mut Draw) {
+    if rig.noise != NoiseKind::MissingCells {
+        return;
+    }
+    let share = draw.between(0.002, 0.02);
+    for values in [
+        &mut written.wheel,
+        &mut written.speed,
+        &mut written.drag,
+        &mut written.load,
+    ] {
+        let mut left = 0;
+        for value in values.iter_mut() {
+            if left == 0 && draw.chance(share / 4.0) {
+                left = draw.whole(1, 6);
+            }
+            if left > 0 {
+                left -= 1;
+                *value = f64::NAN;
+            }
+        }
+    }
 }
 
 impl Written {

@@ -9,6 +9,7 @@ use crate::generate::chain::Readings;
 use crate::generate::chain::{Chain, at, ripple};
 use crate::generate::effect::{Effect, Scale};
 use crate::generate::form::Form;
+use crate::generate::instrument::Instruments;
 use crate::generate::measure::{filled, rms, usable};
 use crate::generate::noise::Written;
 use crate::generate::rig::Rig;
@@ -24,6 +25,7 @@ pub struct Oracle<'a> {
     pub clock: f64,
     pub angle: f64,
     pub wear: Wear,
+    pub instruments: &'a Instruments,
 }
 
 /// Mean squared errors of the oracle, N².
@@ -34,13 +36,13 @@ pub struct Floor {
 }
 
 impl Oracle<'_> {
-    /// The floor of a run.
-    pub fn floor(&self, clean: &Readings, written: &Written) -> Floor {
+    /// The floor of a run: against the load cell's `reading` without random noise, at samples that are usable.
+    pub fn floor(&self, clean: &Readings, reading: &[f64], written: &Written) -> Floor {
         let error = |width: usize| {
             let predicted = self.predict(written, width);
             let errors: Vec<f64> = (0..clean.time.len())
                 .filter(|&i| usable(self.rig, clean, i))
-                .map(|i| clean.drag[i] - predicted[i])
+                .map(|i| reading[i] - predicted[i])
                 .collect();
             rms(errors.iter()).powi(2)
         };
@@ -92,6 +94,19 @@ impl Oracle<'_> {
             self.run,
             self.wear,
         );
+        // What the instruments and the concealed effects make late is taken back, as if known.
+        let spin = (wheel.iter().sum::<f64>() / wheel.len().max(1) as f64)
+            .max(0.1 * self.rig.mean_speed_m_s / self.rig.radius_m);
+        let [wheel_late, speed_late, drag_late, load_late, _] = self.instruments.delays(spin);
+        let effect_late = |forms: [Form; 2]| -> f64 {
+            let late = |effect: &&Effect| forms.contains(&effect.form);
+            self.effects.iter().filter(late).map(|effect| effect.a).sum()
+        };
+        let wheel_late =
+            (wheel_late + effect_late([Form::WheelLate, Form::WheelLateWindow])) / period;
+        let speed_late =
+            (speed_late + effect_late([Form::VehicleLate, Form::VehicleLateHeld])) / period;
+        let load_late = load_late / period;
         let mut stretch = Stretch {
             start: times[0],
             dt,
@@ -100,13 +115,13 @@ impl Oracle<'_> {
         let (mut angle, mut distance) = (self.angle, 0.0);
         for point in 0..points {
             let place = point as f64 / substeps as f64;
-            let mut wheel_now = at(&wheel, place);
+            let mut wheel_now = at(&wheel, place + wheel_late);
             for effect in self.effects {
                 if matches!(effect.form, Form::RippleSine | Form::RippleTiming) {
                     wheel_now /= ripple(effect, angle);
                 }
             }
-            let speed_now = at(&speed, place);
+            let speed_now = at(&speed, place + speed_late);
             let step = if point == 0 { 0.0 } else { dt };
             angle += wheel_now * step;
             distance += speed_now * step;
@@ -114,7 +129,7 @@ impl Oracle<'_> {
                 time: stretch.start + point as f64 * dt,
                 speed: speed_now,
                 wheel: wheel_now,
-                load: at(&load, place),
+                load: at(&load, place + load_late),
                 angle,
                 distance,
                 column: at(&column, place),
@@ -139,7 +154,10 @@ impl Oracle<'_> {
         };
         let reading = chain.drag(&stretch);
         (0..times.len())
-            .map(|i| at(&reading, (i * substeps) as f64))
+            .map(|i| {
+                self.instruments.drag.zero
+                    + at(&reading, (i * substeps) as f64 - drag_late / dt)
+            })
             .collect()
     }
 }

@@ -55,8 +55,10 @@ pub struct RunPlan {
 #[derive(Clone, Debug)]
 pub struct Plan {
     pub kind: PlanKind,
-    pub fit: Vec<RunPlan>,
-    pub fresh: Vec<RunPlan>,
+    /// All runs in the order in which they are driven.
+    pub runs: Vec<RunPlan>,
+    /// Which of them are kept for predictions: the last two, the first and the last, or the first and one between.
+    pub fresh: [usize; 2],
     /// Whether the wheel's angle at the start differs from run to run.
     pub angle_unknown: bool,
 }
@@ -89,12 +91,36 @@ impl Plan {
             clock += run.duration_s + run.standstill_s + draw.between(20.0, 90.0);
             all.push(run);
         }
-        let fresh = all.split_off(runs);
+        let last = runs + fresh_runs - 1;
+        let fresh = match draw.whole(0, 2) {
+            0 => [last - 1, last],
+            1 => [0, last],
+            _ => [0, draw.whole(2, last - 1)],
+        };
         Plan {
             kind,
-            fit: all,
+            runs: all,
             fresh,
             angle_unknown,
+        }
+    }
+
+    /// Runs that are fitted, with their place in the order.
+    pub fn fitted(&self) -> impl Iterator<Item = (usize, &RunPlan)> {
+        self.runs
+            .iter()
+            .enumerate()
+            .filter(|(index, _)| !self.fresh.contains(index))
+    }
+
+    /// Where a run stands in the order.
+    pub fn place(&self, index: usize) -> &'static str {
+        if index == 0 {
+            "first"
+        } else if index + 1 == self.runs.len() {
+            "last"
+        } else {
+            "middle"
         }
     }
 }

@@ -83,6 +83,8 @@ pub struct Setting<'a> {
     pub column: Option<&'a ColumnSignal>,
     /// Noise of wheel and vehicle speed that a slip controller sees, one pair a sample.
     pub seen_noise: &'a [(f64, f64)],
+    /// Relative change of peak friction in this run.
+    pub friction: f64,
 }
 
 /// A run as it truly went.
@@ -234,7 +236,10 @@ impl<'a> Rider<'a> {
         let tyre = Tyre::new(
             setting.effects,
             setting.scale,
-            (rig.peak_friction, rig.critical_slip),
+            (
+                rig.peak_friction * (1.0 + setting.friction),
+                rig.critical_slip,
+            ),
             setting.run,
             setting.wear,
         );

@@ -2,18 +2,22 @@
 
 use anyhow::{Result, bail};
 
-use crate::generate::campaign::{Campaign, NULL_KINDS, Order, make};
+use crate::generate::campaign::{Campaign, NULL_KINDS, NullKind, Order, make};
 use crate::draw::Draw;
+use crate::generate::instrument::ChainKind;
+use crate::generate::instrument::finding::FINDING_KINDS;
 use crate::generate::form::{Form, OUTSIDE, VOCABULARY, may_pair, mechanism};
 
 /// Sizes of effect, in sigma RMS after the base was refitted, that single effects are ordered at.
-pub const STRENGTHS: [f64; 5] = [0.6, 1.0, 2.0, 4.0, 0.3];
+pub const STRENGTHS: [f64; 6] = [0.6, 1.5, 1.0, 4.0, 0.3, 2.0];
 
 /// What to generate.
 #[derive(Clone, Debug)]
 pub struct Request {
-    /// `null`, `single`, `pair` or `outside`.
+    /// `null`, `chain`, `single`, `pair` or `outside`.
     pub stratum: String,
+    /// Through real measuring chains rather than ideal sensors.
+    pub real_chain: bool,
     /// Campaigns.
     pub count: usize,
     /// Only this mechanism, or pairs with it.
@@ -24,8 +28,23 @@ pub struct Request {
 
 /// Writes down the orders of one stratum.
 pub fn orders(request: &Request, seed: u64) -> Result<Vec<Order>> {
-    let mut draw = Draw::new(seed, &[0x0c0de, request.stratum.len() as u64]);
+    let mut draw = Draw::new(
+        seed,
+        &[
+            0x0c0de,
+            request.stratum.len() as u64,
+            u64::from(request.real_chain),
+        ],
+    );
+    let chain = if request.real_chain {
+        ChainKind::Real
+    } else {
+        ChainKind::Ideal
+    };
     let mut out = Vec::new();
+    // Each round in an order of its own, so that a part of one is no fixed part of the vocabulary.
+    let mechanisms = rounds(request.count, VOCABULARY.len(), &mut draw);
+    let outside = rounds(request.count, OUTSIDE.len(), &mut draw);
     for index in 0..request.count {
         let round = index / VOCABULARY.len();
         let strength = |draw: &mut Draw, ladder: &[f64]| {
@@ -36,7 +55,25 @@ pub fn orders(request: &Request, seed: u64) -> Result<Vec<Order>> {
                 stratum: "null".into(),
                 forms: vec![],
                 strength: vec![],
-                null: Some(NULL_KINDS[index % NULL_KINDS.len()]),
+                null: Some(if request.real_chain {
+                    NullKind::RealChain
+                } else {
+                    NULL_KINDS[index % NULL_KINDS.len()]
+                }),
+                chain,
+            },
+            "chain" => Order {
+                stratum: "chain".into(),
+                forms: vec![],
+                strength: vec![],
+                null: None,
+                chain: ChainKind::Only(match &request.mechanism {
+                    Some(word) => *FINDING_KINDS
+                        .iter()
+                        .find(|kind| &kind.word() == word)
+                        .ok_or_else(|| anyhow::anyhow!("`{word}` is no effect of a chain"))?,
+                    None => FINDING_KINDS[index % FINDING_KINDS.len()],
+                }),
             },
             "single" => {
                 let entry = match &request.mechanism {
@@ -44,7 +81,7 @@ pub fn orders(request: &Request, seed: u64) -> Result<Vec<Order>> {
                         Some(entry) => entry,
                         None => bail!("`{id}` is no mechanism of the vocabulary"),
                     },
-                    None => &VOCABULARY[index % VOCABULARY.len()],
+                    None => &VOCABULARY[mechanisms[index]],
                 };
                 let step = if request.mechanism.is_some() {
                     index
@@ -55,12 +92,13 @@ pub fn orders(request: &Request, seed: u64) -> Result<Vec<Order>> {
                 let form = entry.2[(step + step / STRENGTHS.len()) % entry.2.len()];
                 let strength = request
                     .strength
-                    .unwrap_or(STRENGTHS[(step + index % VOCABULARY.len()) % STRENGTHS.len()]);
+                    .unwrap_or(STRENGTHS[(step + mechanisms[index]) % STRENGTHS.len()]);
                 Order {
                     stratum: "single".into(),
                     forms: vec![form],
                     strength: vec![strength],
                     null: None,
+                    chain,
                 }
             }
             "pair" => loop {
@@ -82,6 +120,7 @@ pub fn orders(request: &Request, seed: u64) -> Result<Vec<Order>> {
                         forms,
                         strength,
                         null: None,
+                        chain,
                     };
                 }
             },
@@ -89,16 +128,30 @@ pub fn orders(request: &Request, seed: u64) -> Result<Vec<Order>> {
                 stratum: "outside".into(),
                 forms: vec![match &request.mechanism {
                     Some(word) => outside_form(word)?,
-                    None => OUTSIDE[index % OUTSIDE.len()].0,
+                    None => OUTSIDE[outside[index]].0,
                 }],
                 strength: vec![strength(&mut draw, &[1.0, 2.0, 4.0])],
                 null: None,
+                chain,
             },
-            other => bail!("no stratum `{other}`: null, single, pair or outside"),
+            other => bail!("no stratum `{other}`: null, chain, single, pair or outside"),
         };
         out.push(order);
     }
     Ok(out)
+}
+
+/// So many places of so many kinds: whole rounds, each shuffled.
+fn rounds(count: usize, kinds: usize, draw: &mut Draw) -> Vec<usize> {
+    let mut places = Vec::new();
+    while places.len() < count {
+        let mut round: Vec<usize> = (0..kinds).collect();
+        for last in (1..kinds).rev() {
+            round.swap(last, draw.whole(0, last));
+        }
+        places.extend(round);
+    }
+    places
 }
 
 /// A form outside the vocabulary by its own word.

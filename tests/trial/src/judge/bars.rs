@@ -1,171 +1,257 @@
-//! The bars of the trial beside what was measured.
+//! The figures of the trial beside their bars: what the diagnosis is judged by.
 
 use crate::judge::case::Case;
+use crate::judge::headline::{Better, Headline};
 use crate::judge::tally::{of, shares, strong};
-use crate::share::{Share, mean, percent, quantile};
+use crate::share::Share;
 use crate::table::Table;
 
-/// Whether a bar is met, and whether the interval of the figure leaves no doubt of it.
-fn word(value: f64, bar: f64, at_least: bool, low: f64, high: f64) -> &'static str {
-    let met = (value - bar).abs() < 1e-12 || (value >= bar) == at_least;
-    let sure = if met == at_least {
-        low >= bar
-    } else {
-        high <= bar
-    };
-    // Met and at least: the whole interval above; missed and at least: the whole interval below; and the reverse.
-    match (met, sure) {
-        (true, true) => "met",
-        (true, false) => "met, interval spans the bar",
-        (false, true) => "**missed**",
-        (false, false) => "**missed**, interval spans the bar",
-    }
-}
+/// Ideal sensors and real chains, as keys and as words.
+pub const FAMILIES: [(&str, bool, &str); 2] = [
+    ("ideal", false, "ideal sensors"),
+    ("chains", true, "real chains"),
+];
 
-/// The figures of the trial beside their bars.
-pub fn bars(cases: &[Case]) -> Table {
-    let mut table = Table::new(
-        "Figures and bars",
-        &["figure", "bar", "measured", "95 % interval", "n", "met"],
-    );
-    let mut proportion = |figure: &str, bar: f64, at_least: bool, share: Share| {
-        let [value, interval, n] = share.cells();
-        let met = if share.of == 0 {
-            "-"
-        } else {
-            let (low, high) = share.interval();
-            word(share.value(), bar, at_least, low, high)
-        };
-        table.row([
-            figure.to_owned(),
-            format!("{} {}", if at_least { ">=" } else { "<=" }, percent(bar)),
-            value,
-            interval,
-            n,
-            met.to_owned(),
-        ]);
-    };
-    proportion(
-        "false alarms on null campaigns",
-        0.05,
-        false,
-        Share::count(of(cases, "null"), |case| case.verdict != "consistent"),
-    );
-    proportion(
-        "right mechanism first, single, from 0.6 sigma",
-        0.90,
-        true,
-        Share::count(strong(cases), |case| case.first_right),
-    );
-    proportion(
-        "right first or in its confusable_with",
-        0.97,
-        true,
-        Share::count(strong(cases), |case| case.in_set),
-    );
-    proportion(
+/// Mechanisms that show in the vehicle balance alone.
+const VEHICLE: [&str; 3] = ["aero_drag", "grade_or_drive", "vehicle_inertia"];
+
+/// A sort of sensor is bad where the whole interval of its false alarms lies above this.
+const SENSOR_BAR: f64 = 0.10;
+
+/// The figures of the verdicts, in the order in which they are read.
+pub fn figures(cases: &[Case]) -> Vec<Headline> {
+    let mut found = Vec::new();
+    let within = |real: bool| move |case: &&Case| case.real_chain == real;
+    for ((family, real, words), bar) in FAMILIES.into_iter().zip([0.03, 0.05]) {
+        let nulls: Vec<&Case> = of(cases, "null").filter(within(real)).collect();
+        found.push(Headline::share(
+            &format!("null.{family}.false_physics"),
+            &format!("nothing missing, {words}: false physics"),
+            Better::Lower,
+            Some(bar),
+            Share::count(nulls.iter(), |case| case.false_physics),
+        ));
+        found.push(Headline::share(
+            &format!("null.{family}.sure"),
+            "the same, at a confidence of 0.9 or more",
+            Better::Lower,
+            None,
+            Share::count(nulls.iter(), |case| {
+                case.named
+                    .iter()
+                    .any(|named| !named.right && named.confidence >= 0.9)
+            }),
+        ));
+        found.push(Headline::share(
+            &format!("null.{family}.left_open"),
+            "the same, something left unexplained",
+            Better::Lower,
+            None,
+            Share::count(nulls.iter(), |case| !case.unexplained.is_empty()),
+        ));
+        found.push(Headline::share(
+            &format!("null.{family}.worse"),
+            "the same, a fresh run predicted worse than by the base",
+            Better::Lower,
+            None,
+            Share::count(nulls.iter().flat_map(|case| &case.gains), |gain| gain.worse),
+        ));
+    }
+    let bad: Vec<String> = sensors(cases)
+        .into_iter()
+        .filter(|(_, share)| share.of > 0 && share.interval().0 > SENSOR_BAR)
+        .map(|(sensor, _)| sensor)
+        .collect();
+    found.push(Headline::share(
+        "null.chains.bad_sensors",
+        "sorts of sensor whose false alarms lie wholly above 10 %",
+        Better::Lower,
+        Some(0.0),
+        Share {
+            hits: bad.len(),
+            of: sensors(cases).len(),
+        },
+    ));
+    found.push(Headline::share(
+        "chain.right",
+        "one effect of the chain alone: right finding, value within 20 % or 2 ms",
+        Better::Higher,
+        Some(0.90),
+        Share::count(
+            of(cases, "chain").filter_map(|case| case.finding.as_ref()),
+            |finding| finding.right,
+        ),
+    ));
+    found.push(Headline::share(
+        "chain.false_physics",
+        "one effect of the chain alone: false physics",
+        Better::Lower,
+        None,
+        Share::count(of(cases, "chain"), |case| case.false_physics),
+    ));
+    for ((family, real, words), (first_bar, set_bar)) in
+        FAMILIES.into_iter().zip([(0.93, 0.98), (0.90, 0.93)])
+    {
+        let single: Vec<&Case> = strong(cases).filter(within(real)).collect();
+        found.push(Headline::share(
+            &format!("single.{family}.first"),
+            &format!("one effect from 0.6 sigma, {words}: right first"),
+            Better::Higher,
+            Some(first_bar),
+            Share::count(single.iter(), |case| case.first_right),
+        ));
+        found.push(Headline::share(
+            &format!("single.{family}.in_set"),
+            "the same, right or in the confusable set",
+            Better::Higher,
+            Some(set_bar),
+            Share::count(single.iter(), |case| case.in_set),
+        ));
+        found.push(Headline::share(
+            &format!("single.{family}.false_beside"),
+            "the same, false physics named at all",
+            Better::Lower,
+            None,
+            Share::count(single.iter(), |case| case.false_physics),
+        ));
+    }
+    found.push(Headline::share(
+        "single.vehicle.first",
+        "air drag, grade or mass, from 0.6 sigma: right first",
+        Better::Higher,
+        Some(0.95),
+        Share::count(
+            strong(cases).filter(|case| {
+                case.truth
+                    .first()
+                    .is_some_and(|id| VEHICLE.contains(&id.as_str()))
+            }),
+            |case| case.first_right,
+        ),
+    ));
+    for ((family, real, words), bar) in FAMILIES.into_iter().zip([0.92, 0.85]) {
+        let f1: Vec<f64> = of(cases, "pair")
+            .filter(within(real))
+            .map(|case| case.f1)
+            .collect();
+        found.push(Headline::mean(
+            &format!("pair.{family}.f1"),
+            &format!("two effects, {words}: F1 of the names"),
+            Better::Higher,
+            Some(bar),
+            &f1,
+        ));
+    }
+    found.push(Headline::share(
+        "outside.says",
         "outside the vocabulary: says so",
-        0.90,
-        true,
+        Better::Higher,
+        Some(0.93),
         Share::count(of(cases, "outside"), |case| case.honest),
-    );
-    proportion(
+    ));
+    found.push(Headline::share(
+        "outside.variable",
         "outside the vocabulary: right variable",
-        0.80,
-        true,
+        Better::Higher,
+        Some(0.85),
         Share::count(
             of(cases, "outside").filter(|case| case.variable_right.is_some()),
             |case| case.variable_right == Some(true),
         ),
-    );
-    let pulls: Vec<f64> = cases
-        .iter()
-        .flat_map(|case| case.figures.iter().map(|figure| figure.pull.abs()))
-        .collect();
-    proportion(
-        "parameter within 3 of its own std",
-        0.95,
-        true,
-        Share::count(pulls.iter(), |pull| **pull <= 3.0),
-    );
-    let gains: Vec<_> = cases.iter().flat_map(|case| &case.gains).collect();
-    proportion(
-        "repaired worse than base on a fresh run",
-        0.01,
-        false,
-        Share::count(gains.iter(), |gain| gain.worse),
-    );
-    let mut number =
-        |figure: &str, bar: f64, at_least: bool, value: f64, (low, high): (f64, f64), n: usize| {
-            let met = if value.is_nan() {
-                "-"
-            } else {
-                word(value, bar, at_least, low, high)
-            };
-            let interval = if low.is_finite() && high.is_finite() {
-                format!("{low:.3}..{high:.3}")
-            } else {
-                "-".to_owned()
-            };
-            table.row([
-                figure.to_owned(),
-                format!("{} {bar}", if at_least { ">=" } else { "<=" }),
-                format!("{value:.3}"),
-                interval,
-                n.to_string(),
-                met.to_owned(),
-            ]);
-        };
-    let with_error = |values: &[f64]| {
-        let (mean, error) = mean(values);
-        (mean, (mean - 1.96 * error, mean + 1.96 * error))
-    };
-    let f1: Vec<f64> = of(cases, "pair").map(|case| case.f1).collect();
-    let (value, interval) = with_error(&f1);
-    number(
-        "pairs of effects, F1 of the set",
-        0.85,
-        true,
-        value,
-        interval,
-        f1.len(),
-    );
+    ));
     let gained = shares(cases);
-    let spread = |at: f64| {
-        // Order statistics: the ranks that bracket the quantile.
-        let n = gained.len() as f64;
-        let half = 1.96 * (at * (1.0 - at) / n.max(1.0)).sqrt();
+    for (key, what, bar, at) in [
         (
-            quantile(&gained, (at - half).max(0.0)),
-            quantile(&gained, (at + half).min(1.0)),
-        )
-    };
-    number(
-        "gain on fresh runs, share of the oracle's, median",
-        0.95,
-        true,
-        quantile(&gained, 0.5),
-        spread(0.5),
-        gained.len(),
-    );
-    number(
-        "the same, worst tenth",
-        0.7,
-        true,
-        quantile(&gained, 0.1),
-        spread(0.1),
-        gained.len(),
-    );
-    for (figure, bar, local) in [
-        ("location, IoU, all effects", 0.6, false),
-        ("location, IoU, local effects", 0.75, true),
+            "predict.gain",
+            "gain above the floor on fresh runs, median",
+            0.97,
+            0.5,
+        ),
+        (
+            "predict.gain_worst_tenth",
+            "the same, worst tenth",
+            0.8,
+            0.1,
+        ),
+    ] {
+        found.push(Headline::quantile(
+            key,
+            what,
+            Better::Higher,
+            Some(bar),
+            &gained,
+            at,
+        ));
+    }
+    for (key, what, bar, local) in [
+        ("where.iou", "location, IoU, all effects", 0.8, false),
+        (
+            "where.iou_local",
+            "location, IoU, local effects",
+            0.75,
+            true,
+        ),
     ] {
         let overlaps: Vec<f64> = strong(cases)
             .filter(|case| !local || case.local)
             .filter_map(|case| case.iou)
             .collect();
-        let (value, interval) = with_error(&overlaps);
-        number(figure, bar, true, value, interval, overlaps.len());
+        found.push(Headline::mean(
+            key,
+            what,
+            Better::Higher,
+            Some(bar),
+            &overlaps,
+        ));
+    }
+    found.push(Headline::share(
+        "contract.failed",
+        "calls that failed, or answers that cannot be read",
+        Better::Lower,
+        Some(0.0),
+        Share::count(cases, |case| !case.complaints.is_empty()),
+    ));
+    found.push(Headline::share(
+        "contract.breached",
+        "answers that lack a part of the contract",
+        Better::Lower,
+        Some(0.0),
+        Share::count(cases, |case| !case.breaches.is_empty()),
+    ));
+    found
+}
+
+/// False physics on null campaigns through real chains, by sort of wheel and of vehicle sensor.
+pub fn sensors(cases: &[Case]) -> Vec<(String, Share)> {
+    let nulls: Vec<&Case> = of(cases, "null").filter(|case| case.real_chain).collect();
+    let mut found: Vec<(String, Share)> = Vec::new();
+    for (side, sensor) in [
+        ("wheel", (|case| &case.wheel_sensor) as fn(&Case) -> &String),
+        ("vehicle", |case| &case.vehicle_sensor),
+    ] {
+        let mut words: Vec<&str> = nulls.iter().map(|case| sensor(case).as_str()).collect();
+        words.sort_unstable();
+        words.dedup();
+        for word in words {
+            found.push((
+                format!("{side}: {word}"),
+                Share::count(nulls.iter().filter(|case| sensor(case) == word), |case| {
+                    case.false_physics
+                }),
+            ));
+        }
+    }
+    found
+}
+
+/// Figures with their bars as a table.
+pub fn table(title: &str, figures: &[Headline]) -> Table {
+    let mut table = Table::new(
+        title,
+        &["figure", "bar", "measured", "95 % interval", "n", "met"],
+    );
+    for figure in figures {
+        table.row(figure.cells());
     }
     table
 }

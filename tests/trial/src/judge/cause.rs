@@ -20,14 +20,16 @@ pub fn symptom(case: &Case) -> String {
         .collect();
     let wrong = wrong.join(", ");
     match case.stratum.as_str() {
-        "null" if case.verdict != "consistent" => said.push(if wrong.is_empty() {
-            format!(
-                "nothing is concealed, yet a dependence on {} was claimed",
-                left(case)
-            )
-        } else {
-            format!("nothing is concealed, yet it named {wrong}")
-        }),
+        "null" | "chain" if case.false_physics || !case.unexplained.is_empty() => {
+            said.push(if wrong.is_empty() {
+                format!(
+                    "nothing is concealed, yet a dependence on {} was claimed",
+                    left(case)
+                )
+            } else {
+                format!("nothing is concealed, yet it named {wrong}")
+            })
+        }
         "outside" => {
             if !case.honest {
                 said.push(if wrong.is_empty() {
@@ -173,11 +175,19 @@ pub fn shortfalls(cases: &[Case]) -> Table {
         .into_iter()
         .filter(|case| case.weakest() >= BAR_STRENGTH)
         .collect();
-    row("false alarms", of("null"), &|case| {
-        if case.verdict == "consistent" {
+    row("false physics, nothing missing", of("null"), &|case| {
+        if !case.false_physics {
             return vec![];
         }
-        vec![format!("{} in {} noise", first_named(case), case.kind)]
+        vec![format!(
+            "{} {}",
+            first_named(case),
+            if case.real_chain {
+                "through a chain"
+            } else {
+                "on ideal sensors"
+            }
+        )]
     });
     row("right mechanism first", strong.clone(), &|case| {
         if case.first_right {

@@ -1,178 +1,246 @@
-//! What the design buys: textbook baselines on the same files, and parts of the argument left out.
+//! What the design buys: textbook baselines and other engines on the same files.
 
-use crate::baseline::regression::Verdicts;
+use std::collections::BTreeMap;
+
+use crate::baseline::Verdicts;
 use crate::generate::campaign::Truth;
 use crate::judge::case::{BAR_STRENGTH, Case};
-use crate::judge::tally::{of, shares, strong};
-use crate::share::{Share, mean, percent, quantile};
+use crate::share::{Share, mean, percent};
 use crate::table::Table;
 
-/// The tool beside textbook methods on the same files.
-pub fn baselines(cases: &[Case], verdicts: &[(Truth, Verdicts)]) -> Table {
+/// One method's answer to one campaign, in what the table of methods asks.
+struct Answer<'a> {
+    stratum: &'a str,
+    real_chain: bool,
+    weakest: f64,
+    /// Physics named that is not there; of a test that names nothing, any alarm.
+    alarm: bool,
+    /// None where the method names nothing by its nature.
+    first_right: Option<bool>,
+    f1: Option<f64>,
+    /// None where the method cannot say so.
+    says_so: Option<bool>,
+}
+
+impl<'a> Answer<'a> {
+    /// Of the tool, or another build of it.
+    fn of_case(case: &'a Case) -> Answer<'a> {
+        Answer {
+            stratum: &case.stratum,
+            real_chain: case.real_chain,
+            weakest: case.weakest(),
+            alarm: case.false_physics,
+            first_right: Some(case.first_right),
+            f1: Some(case.f1),
+            says_so: Some(case.honest),
+        }
+    }
+
+    /// Of a method that gives names alone.
+    fn of_names(truth: &'a Truth, real_chain: bool, names: &[&str]) -> Answer<'a> {
+        Answer {
+            alarm: !false_names(truth, names).is_empty(),
+            first_right: Some(
+                names
+                    .iter()
+                    .find(|id| !tolerated(truth, id))
+                    .is_some_and(|id| accepted(truth, id)),
+            ),
+            f1: Some(f1(truth, names)),
+            says_so: None,
+            ..Answer::of_whiteness(truth, real_chain, true)
+        }
+    }
+
+    /// Of a test that says that something is amiss, but not what.
+    fn of_whiteness(truth: &'a Truth, real_chain: bool, white: bool) -> Answer<'a> {
+        Answer {
+            stratum: &truth.stratum,
+            real_chain,
+            weakest: truth
+                .concealed
+                .iter()
+                .map(|concealed| concealed.effect.strength_sigma)
+                .fold(f64::INFINITY, f64::min),
+            alarm: !white,
+            first_right: None,
+            f1: None,
+            says_so: Some(!white),
+        }
+    }
+}
+
+fn accepted(truth: &Truth, id: &str) -> bool {
+    truth
+        .concealed
+        .iter()
+        .any(|concealed| concealed.accept.iter().any(|name| name == id))
+}
+
+/// Whether a name may stand beside what is concealed without being wrong, and is not itself concealed.
+/// Nor are names that the measuring chain itself makes true.
+fn tolerated(truth: &Truth, id: &str) -> bool {
+    !accepted(truth, id)
+        && truth
+            .concealed
+            .iter()
+            .flat_map(|concealed| &concealed.tolerated)
+            .chain(&truth.tolerated)
+            .any(|name| name == id)
+}
+
+/// Names that are neither concealed nor tolerated.
+pub fn false_names<'n>(truth: &Truth, names: &[&'n str]) -> Vec<&'n str> {
+    names
+        .iter()
+        .copied()
+        .filter(|id| !accepted(truth, id) && !tolerated(truth, id))
+        .collect()
+}
+
+/// F1 of a set of names, those tolerated left out of it.
+fn f1(truth: &Truth, names: &[&str]) -> f64 {
+    let hits = truth
+        .concealed
+        .iter()
+        .filter(|concealed| {
+            names
+                .iter()
+                .any(|id| concealed.accept.iter().any(|name| name == id))
+        })
+        .count();
+    let judged = names.iter().filter(|id| !tolerated(truth, id)).count();
+    let wanted = truth
+        .concealed
+        .iter()
+        .filter(|concealed| concealed.effect.id != "outside")
+        .count();
+    if judged + wanted == 0 {
+        1.0
+    } else {
+        2.0 * hits as f64 / (judged + wanted) as f64
+    }
+}
+
+/// The tool beside textbook methods, and beside other builds of itself (`others`: name and judged cases), on the same
+/// files.
+pub fn baselines(
+    cases: &[Case],
+    verdicts: &[(Truth, Verdicts)],
+    others: &[(&str, &[Case])],
+) -> Table {
+    let chains: BTreeMap<&str, bool> = cases
+        .iter()
+        .map(|case| (case.campaign.as_str(), case.real_chain))
+        .collect();
+    let textbook = |answer: &dyn Fn(&Verdicts) -> Vec<&'static str>| -> Vec<Answer> {
+        verdicts
+            .iter()
+            .map(|(truth, verdict)| {
+                let real = chains.get(truth.campaign.as_str()).copied();
+                Answer::of_names(truth, real.unwrap_or(false), &answer(verdict))
+            })
+            .collect()
+    };
+    let mut methods: Vec<(&str, Vec<Answer>)> = vec![(
+        "muslip diagnose",
+        cases.iter().map(Answer::of_case).collect(),
+    )];
+    for (name, cases) in others {
+        methods.push((name, cases.iter().map(Answer::of_case).collect()));
+    }
+    methods.push((
+        "regression without errors in variables, BIC",
+        textbook(&|verdict| verdict.regression.clone()),
+    ));
+    methods.push((
+        "output-error fit of each balance, BIC",
+        textbook(&|verdict| verdict.output_error.clone()),
+    ));
+    methods.push((
+        "best single by training error",
+        textbook(&|verdict| {
+            Vec::from_iter((!verdict.best_single.is_empty()).then_some(verdict.best_single))
+        }),
+    ));
+    methods.push((
+        "residual whiteness alone",
+        verdicts
+            .iter()
+            .map(|(truth, verdict)| {
+                let real = chains.get(truth.campaign.as_str()).copied();
+                Answer::of_whiteness(truth, real.unwrap_or(false), verdict.white)
+            })
+            .collect(),
+    ));
     let mut table = Table::new(
-        "Baselines on the same files",
+        "Methods on the same files",
         &[
             "method",
-            "false alarms",
-            "right first, single from 0.6 sigma",
+            "false physics, ideal nulls",
+            "nulls through chains",
+            "right first, ideal, from 0.6 sigma",
+            "right first, chains",
             "pairs, F1",
             "outside: says so",
         ],
     );
-    let share = |share: Share| {
-        if share.of == 0 {
-            "-".to_owned()
-        } else {
-            percent(share.value())
-        }
-    };
-    let number = |values: &[f64]| {
-        if values.is_empty() {
-            "-".to_owned()
-        } else {
-            format!("{:.2}", mean(values).0)
-        }
-    };
-    let f1: Vec<f64> = of(cases, "pair").map(|case| case.f1).collect();
-    table.row([
-        "muslip diagnose".to_owned(),
-        share(Share::count(of(cases, "null"), |case| {
-            case.verdict != "consistent"
-        })),
-        share(Share::count(strong(cases), |case| case.first_right)),
-        number(&f1),
-        share(Share::count(of(cases, "outside"), |case| case.honest)),
-    ]);
-    let stratum = |name: &'static str| verdicts.iter().filter(move |pair| pair.0.stratum == name);
-    let single = || {
-        stratum("single").filter(|pair| {
-            pair.0
-                .concealed
-                .iter()
-                .all(|concealed| concealed.effect.strength_sigma >= BAR_STRENGTH)
-        })
-    };
-    let right = |truth: &Truth, id: Option<&str>| {
-        id.is_some_and(|id| {
-            truth
-                .concealed
-                .iter()
-                .any(|concealed| concealed.accept.iter().any(|name| name == id))
-        })
-    };
-    let overlap = |truth: &Truth, named: &[&str]| {
-        let hits = truth
-            .concealed
-            .iter()
-            .filter(|concealed| {
-                named
-                    .iter()
-                    .any(|id| concealed.accept.iter().any(|name| name == id))
-            })
-            .count();
-        2.0 * hits as f64 / (named.len() + truth.concealed.len()) as f64
-    };
-    let pairs: Vec<f64> = stratum("pair")
-        .map(|(truth, verdict)| overlap(truth, &verdict.selected))
-        .collect();
-    table.row([
-        "white-noise BIC, forward".to_owned(),
-        share(Share::count(stratum("null"), |pair| {
-            !pair.1.selected.is_empty()
-        })),
-        share(Share::count(single(), |pair| {
-            right(&pair.0, pair.1.selected.first().copied())
-        })),
-        number(&pairs),
-        "never".to_owned(),
-    ]);
-    let pairs: Vec<f64> = stratum("pair")
-        .map(|(truth, verdict)| overlap(truth, &[verdict.best_single]))
-        .collect();
-    table.row([
-        "best single by training error".to_owned(),
-        share(Share::count(stratum("null"), |pair| {
-            !pair.1.best_single.is_empty()
-        })),
-        share(Share::count(single(), |pair| {
-            right(&pair.0, Some(pair.1.best_single))
-        })),
-        number(&pairs),
-        "never".to_owned(),
-    ]);
-    table.row([
-        "residual whiteness alone".to_owned(),
-        share(Share::count(stratum("null"), |pair| !pair.1.white)),
-        "names nothing".to_owned(),
-        "-".to_owned(),
-        share(Share::count(stratum("outside"), |pair| !pair.1.white)),
-    ]);
+    for (name, answers) in &methods {
+        table.row(cells(name, answers));
+    }
+    table.note = Some(
+        "False physics: a name that is neither concealed nor true of the measuring chain; of the whiteness test, any alarm. The textbook methods take every sample as independent; \"-\": not tried, or not in the method's nature."
+            .to_owned(),
+    );
     table
 }
 
-/// The tool with parts of its argument left out, beside the whole on the same campaigns.
-pub fn ablations(rows: &[(String, std::result::Result<Vec<Case>, String>)]) -> Table {
-    let mut table = Table::new(
-        "Ablations",
-        &[
-            "left out",
-            "campaigns",
-            "false alarms",
-            "right first, single from 0.6 sigma",
-            "in set",
-            "pairs, F1",
-            "outside: says so",
-            "figures within 3 std",
-            "gain share, median",
-            "worst tenth",
-            "worse than base",
-        ],
-    );
-    for (name, cases) in rows {
-        let cases = match cases {
-            Ok(cases) => cases,
-            Err(why) => {
-                table.rows.push(vec![name.clone(), why.clone()]);
-                continue;
-            }
-        };
-        let share = |share: Share| {
-            if share.of == 0 {
-                "-".to_owned()
-            } else {
-                format!("{} ({}/{})", percent(share.value()), share.hits, share.of)
-            }
-        };
-        let number = |value: f64| {
-            if value.is_nan() {
-                "-".to_owned()
-            } else {
-                format!("{value:.2}")
-            }
-        };
-        let f1: Vec<f64> = of(cases, "pair").map(|case| case.f1).collect();
-        let gained = shares(cases);
-        table.row([
-            name.clone(),
-            cases.len().to_string(),
-            share(Share::count(of(cases, "null"), |case| {
-                case.verdict != "consistent"
-            })),
-            share(Share::count(strong(cases), |case| case.first_right)),
-            share(Share::count(strong(cases), |case| case.in_set)),
-            number(if f1.is_empty() { f64::NAN } else { mean(&f1).0 }),
-            share(Share::count(of(cases, "outside"), |case| case.honest)),
-            share(Share::count(
-                cases.iter().flat_map(|case| &case.figures),
-                |figure| figure.pull.abs() <= 3.0,
-            )),
-            number(quantile(&gained, 0.5)),
-            number(quantile(&gained, 0.1)),
-            share(Share::count(
-                cases.iter().flat_map(|case| &case.gains),
-                |gain| gain.worse,
-            )),
-        ]);
-    }
-    table
+fn cells(name: &str, answers: &[Answer]) -> [String; 7] {
+    let share = |stratum: &str,
+                 condition: &dyn Fn(&Answer) -> bool,
+                 value: &dyn Fn(&Answer) -> Option<bool>| {
+        let share = Share::count(
+            answers
+                .iter()
+                .filter(|answer| answer.stratum == stratum && condition(answer))
+                .filter_map(value),
+            |value| *value,
+        );
+        if share.of == 0 {
+            "-".to_owned()
+        } else {
+            format!("{} ({}/{})", percent(share.value()), share.hits, share.of)
+        }
+    };
+    let strong = |answer: &Answer| answer.weakest >= BAR_STRENGTH;
+    let f1: Vec<f64> = answers
+        .iter()
+        .filter(|answer| answer.stratum == "pair")
+        .filter_map(|answer| answer.f1)
+        .collect();
+    [
+        name.to_owned(),
+        share("null", &|answer| !answer.real_chain, &|answer| {
+            Some(answer.alarm)
+        }),
+        share("null", &|answer| answer.real_chain, &|answer| {
+            Some(answer.alarm)
+        }),
+        share(
+            "single",
+            &|answer| !answer.real_chain && strong(answer),
+            &|answer| answer.first_right,
+        ),
+        share(
+            "single",
+            &|answer| answer.real_chain && strong(answer),
+            &|answer| answer.first_right,
+        ),
+        if f1.is_empty() {
+            "-".to_owned()
+        } else {
+            format!("{:.2}", mean(&f1).0)
+        },
+        share("outside", &|_| true, &|answer| answer.says_so),
+    ]
 }

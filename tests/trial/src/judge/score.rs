@@ -7,11 +7,11 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use anyhow::{Context, Result, bail};
 use rayon::prelude::*;
 
-use crate::baseline::regression::{Verdicts, verdicts};
+use crate::baseline::{Verdicts, verdicts};
 use crate::generate::campaign::Truth;
 use crate::generate::files::{names, seal, truth};
 use crate::judge::case::{Case, judge};
-use crate::judge::{bars, rivals, tally};
+use crate::judge::{bars, calibration, coverage, power, prediction, rivals, tally, uniform};
 use crate::tool::{Answer, Tool};
 
 /// What to score, and how much to say.
@@ -152,10 +152,15 @@ impl Report {
         let mut text = String::new();
         for table in [
             tally::nulls(cases),
+            tally::chains(cases),
             tally::mechanisms(cases),
             tally::strengths(cases),
             tally::outside(cases),
-            tally::calibration(cases),
+            calibration::table(cases),
+            coverage::table(cases),
+            prediction::table(cases),
+            uniform::table(cases),
+            power::table(cases),
             tally::confusion(cases),
             tally::figures(cases, 12),
         ] {
@@ -170,9 +175,9 @@ impl Report {
             text.push('\n');
         }
         if !self.baselines.is_empty() {
-            text.push_str(&rivals::baselines(cases, &self.baselines).text());
+            text.push_str(&rivals::baselines(cases, &self.baselines, &[]).text());
         }
-        text.push_str(&bars::bars(cases).text());
+        text.push_str(&bars::table("Figures and bars", &bars::figures(cases)).text());
         text
     }
 

@@ -3,9 +3,10 @@
 use std::collections::BTreeMap;
 
 use crate::generate::form::{OUTSIDE, VOCABULARY};
-use crate::judge::case::{BAR_STRENGTH, Case};
+use crate::judge::case::{BAR_STRENGTH, Case, FindingCase};
 use crate::share::{Share, mean, percent, quantile};
 use crate::table::Table;
+
 /// Cases of a stratum.
 pub fn of<'a>(cases: &'a [Case], stratum: &'a str) -> impl Iterator<Item = &'a Case> + Clone {
     cases.iter().filter(move |case| case.stratum == stratum)
@@ -27,23 +28,100 @@ pub fn shares(cases: &[Case]) -> Vec<f64> {
 /// False alarms by sort of null campaign.
 pub fn nulls(cases: &[Case]) -> Table {
     let mut table = Table::new(
-        "False alarms by sort of null campaign",
-        &["null", "alarms", "95 % interval", "n", "what was named"],
+        "False physics by sort of null campaign",
+        &[
+            "nothing missing",
+            "false physics",
+            "95 % interval",
+            "n",
+            "what was named, and how often",
+        ],
+    );
+    let mut groups: BTreeMap<String, Vec<&Case>> = BTreeMap::new();
+    for case in of(cases, "null") {
+        let keys = if case.real_chain {
+            vec![
+                format!("real chain, wheel {}", case.wheel_sensor),
+                format!("real chain, vehicle {}", case.vehicle_sensor),
+            ]
+        } else {
+            vec![format!("ideal sensors, {}", case.kind)]
+        };
+        for key in keys {
+            groups.entry(key).or_default().push(case);
+        }
+    }
+    for (kind, group) in groups {
+        let share = Share::count(group.iter(), |case| case.false_physics);
+        let [value, interval, n] = share.cells();
+        table.row([
+            kind,
+            value,
+            interval,
+            n,
+            most_frequent(group.iter().flat_map(|case| {
+                case.named
+                    .iter()
+                    .filter(|named| !named.right)
+                    .map(|named| named.id.as_str())
+            })),
+        ]);
+    }
+    table
+}
+
+/// Words with their counts, the most frequent first, at most eight.
+pub fn most_frequent<'a>(words: impl Iterator<Item = &'a str>) -> String {
+    let mut counts: BTreeMap<&str, usize> = BTreeMap::new();
+    for word in words {
+        *counts.entry(word).or_default() += 1;
+    }
+    let mut ranked: Vec<(&str, usize)> = counts.into_iter().collect();
+    ranked.sort_by(|a, b| b.1.cmp(&a.1).then(a.0.cmp(b.0)));
+    let told: Vec<String> = ranked
+        .iter()
+        .take(8)
+        .map(|(word, count)| format!("{word} {count}"))
+        .collect();
+    told.join(", ")
+}
+
+/// One effect of the chain alone: whether `chain` says so, and what was named instead.
+pub fn chains(cases: &[Case]) -> Table {
+    let mut table = Table::new(
+        "One effect of the measuring chain alone",
+        &[
+            "effect",
+            "found",
+            "value within 20 % or 2 ms",
+            "n",
+            "false physics",
+            "named",
+        ],
     );
     let mut groups: BTreeMap<&str, Vec<&Case>> = BTreeMap::new();
-    for case in of(cases, "null") {
+    for case in of(cases, "chain") {
         groups.entry(case.kind.as_str()).or_default().push(case);
     }
     for (kind, group) in groups {
-        let share = Share::count(group.iter(), |case| case.verdict != "consistent");
-        let mut named: Vec<&str> = group
-            .iter()
-            .flat_map(|case| case.named.iter().map(|named| named.id.as_str()))
-            .collect();
-        named.sort_unstable();
-        named.dedup();
-        let [value, interval, n] = share.cells();
-        table.row([kind.to_owned(), value, interval, n, named.join(", ")]);
+        let with = |condition: &dyn Fn(&FindingCase) -> bool| {
+            let share = Share::count(group.iter(), |case| {
+                case.finding.as_ref().is_some_and(condition)
+            });
+            share.hits.to_string()
+        };
+        table.row([
+            kind.to_owned(),
+            with(&|finding| finding.reported.is_some()),
+            with(&|finding| finding.right),
+            group.len().to_string(),
+            percent(Share::count(group.iter(), |case| case.false_physics).value()),
+            most_frequent(
+                group
+                    .iter()
+                    .flat_map(|case| case.named.iter().map(|named| named.id.as_str())),
+            ),
+        ]);
     }
     table
 }
@@ -199,93 +277,6 @@ pub fn outside(cases: &[Case]) -> Table {
     table
 }
 
-/// Of the calls made at a confidence, how many were right.
-pub fn calibration(cases: &[Case]) -> Table {
-    let mut table = Table::new(
-        "Calibration of confidence",
-        &["confidence", "mean", "right", "95 % interval", "n"],
-    );
-    let calls: Vec<(f64, bool)> = cases
-        .iter()
-        .flat_map(|case| {
-            case.named
-                .iter()
-                .map(|named| (named.confidence, named.right))
-        })
-        .filter(|call| call.0.is_finite())
-        .collect();
-    let edges = [0.0, 0.5, 0.7, 0.8, 0.9, 0.95, 0.99, 1.0 + 1e-9];
-    for pair in edges.windows(2) {
-        let group: Vec<&(f64, bool)> = calls
-            .iter()
-            .filter(|call| (pair[0]..pair[1]).contains(&call.0))
-            .collect();
-        if group.is_empty() {
-            continue;
-        }
-        let average = group.iter().map(|call| call.0).sum::<f64>() / group.len() as f64;
-        let [value, interval, n] = Share::count(group.iter(), |call| call.1).cells();
-        table.row([
-            format!("{:.2}..{:.2}", pair[0], pair[1].min(1.0)),
-            format!("{average:.3}"),
-            value,
-            interval,
-            n,
-        ]);
-    }
-    table
-}
-
-/// How far figures lie off in their own standard deviations, by mechanism.
-pub fn pulls(cases: &[Case]) -> Table {
-    let mut table = Table::new(
-        "Calibration of parameters",
-        &[
-            "figure",
-            "n",
-            "within 1 std",
-            "within 2",
-            "within 3",
-            "95 % interval of within 3",
-            "median error",
-            "median std, relative",
-        ],
-    );
-    let mut groups: BTreeMap<String, Vec<&crate::judge::case::FigureCase>> = BTreeMap::new();
-    for figure in cases.iter().flat_map(|case| &case.figures) {
-        for key in [
-            "(all)".to_owned(),
-            format!("{} {}", figure.mechanism, figure.name),
-        ] {
-            groups.entry(key).or_default().push(figure);
-        }
-    }
-    for (key, group) in groups {
-        let within = |limit: f64| Share::count(group.iter(), |figure| figure.pull.abs() <= limit);
-        let [three, interval, _] = within(3.0).cells();
-        let middle = |value: &dyn Fn(&crate::judge::case::FigureCase) -> f64| {
-            let values: Vec<f64> = group.iter().map(|figure| value(figure)).collect();
-            quantile(&values, 0.5)
-        };
-        let size = |figure: &crate::judge::case::FigureCase| figure.truth.abs().max(1e-12);
-        table.row([
-            key,
-            group.len().to_string(),
-            percent(within(1.0).value()),
-            percent(within(2.0).value()),
-            three,
-            interval,
-            percent(middle(&|f| (f.value - f.truth).abs() / size(f))),
-            percent(middle(&|f| f.std / size(f))),
-        ]);
-    }
-    table.note = Some(
-        "A normal error lies within 1, 2 and 3 of its standard deviations in 68, 95 and 99.7 % of cases. Error and std relative to the true figure."
-            .to_owned(),
-    );
-    table
-}
-
 /// What was named first for each truth: the full confusion matrix.
 pub fn confusion(cases: &[Case]) -> Table {
     let truth_of = |case: &Case| match case.stratum.as_str() {
@@ -369,9 +360,7 @@ pub fn worst(cases: &[Case], most: usize) -> Vec<&Case> {
             .fold(0.0, f64::max);
         let broken = 3.0 * f64::from(u8::from(!case.complaints.is_empty()));
         let dishonest = f64::from(u8::from(case.stratum == "outside" && !case.honest));
-        let alarm = f64::from(u8::from(
-            case.stratum == "null" && case.verdict != "consistent",
-        ));
+        let alarm = f64::from(u8::from(case.stratum == "null" && case.false_physics));
         wrong + missed + worse + lost + broken + dishonest + alarm
     };
     let mut ranked: Vec<(f64, &Case)> = cases

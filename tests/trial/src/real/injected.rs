@@ -9,12 +9,14 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
+use super::ask::Ask;
 use super::recording::{RADIUS, Recording};
-use super::{diagnosis, figure, told};
+use super::{figure, told};
 use crate::contract::{list, text};
 use crate::draw::Draw;
 use crate::generate::files::seal;
 use crate::generate::tyre::law;
+use crate::judge::headline::{Better, Headline};
 use crate::report::trial::Trial;
 use crate::share::Share;
 use crate::table::Table;
@@ -270,10 +272,10 @@ pub(super) fn injected(
     trial: &Trial,
     friction: &Path,
     work: &Path,
-    answers: &Path,
-) -> Result<Table> {
+    ask: &Ask,
+) -> Result<(Table, Vec<Headline>)> {
     let circles: Vec<Recording> = (1..=8)
-        .map(|n| Recording::read(&friction.join(format!("circle{n:02}.csv"))))
+        .map(|n| Ok(Recording::read(&friction.join(format!("circle{n:02}.csv")))?.bare()))
         .collect::<Result<_>>()?;
     let count = |full: f64| (full * trial.scale).ceil().max(2.0) as u64;
     let mut orders: Vec<(Option<usize>, u64)> = (0..count(16.0)).map(|k| (None, k)).collect();
@@ -329,11 +331,8 @@ pub(super) fn injected(
                 let runs: Vec<PathBuf> = (1..=4)
                     .map(|n| open.join(name).join(format!("run{n:02}.csv")))
                     .collect();
-                let out = answers.join(format!("{}-{name}", &hash[..12]));
-                Ok((
-                    name.clone(),
-                    diagnosis(&trial.tool, &open.join(name).join("rig.toml"), &runs, &out)?,
-                ))
+                let found = ask.diagnose(&open.join(name).join("rig.toml"), &runs)?;
+                Ok((name.clone(), found.value))
             })
             .collect::<Result<_>>()
     })?;
@@ -345,7 +344,40 @@ pub(super) fn injected(
         let path = open.join("sealed").join(name).join("truth.json");
         judged.push((serde_json::from_str(&fs::read_to_string(path)?)?, value));
     }
-    Ok(tabulate(&judged, &hash, &cannot))
+    Ok((tabulate(&judged, &hash, &cannot), headlines(&judged)))
+}
+
+/// False alarms without an effect, and effects that were named first or in the set of the first.
+fn headlines(judged: &[(Sealed, Value)]) -> Vec<Headline> {
+    let named = |case: &&(Sealed, Value)| {
+        list(&case.1, "mechanisms").first().is_some_and(|first| {
+            text(first, "id") == case.0.id
+                || list(first, "confusable_with")
+                    .iter()
+                    .any(|other| text(other, "id") == case.0.id)
+        })
+    };
+    let with = |effect: bool| {
+        judged
+            .iter()
+            .filter(move |case| case.0.id.is_empty() != effect)
+    };
+    vec![
+        Headline::share(
+            "real.alarms",
+            "alarms at real inputs and real noise without an effect",
+            Better::Lower,
+            None,
+            Share::count(with(false), |case| text(&case.1, "verdict") != "consistent"),
+        ),
+        Headline::share(
+            "real.in_set",
+            "effects put into real inputs and real noise that are named first, or confusable with the first",
+            Better::Higher,
+            None,
+            Share::count(with(true), named),
+        ),
+    ]
 }
 
 fn tabulate(judged: &[(Sealed, Value)], hash: &str, cannot: &[String]) -> Table {

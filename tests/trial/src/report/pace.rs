@@ -13,7 +13,9 @@ use serde::{Deserialize, Serialize};
 
 use crate::draw::Draw;
 use crate::generate::tyre::law;
+use crate::judge::headline::{Better, Headline, Unit};
 use crate::process::{Cost, load, run};
+use crate::share::quantile;
 use crate::table::Table;
 use crate::tool::{PATIENCE, Tool};
 
@@ -25,9 +27,11 @@ pub struct Pace {
     /// Busy processes before the start, where the system tells.
     pub load: Option<f64>,
     pub complaint: Option<String>,
-    /// Bars: wall time in s, peak memory in bytes.
-    pub bars: (f64, Option<f64>),
 }
+
+const SIX: &str = "six runs of 5,000 samples";
+const TEN_MILLION: &str = "ten runs of 1,000,000 samples";
+const GIB: f64 = 1024.0 * 1024.0 * 1024.0;
 
 const RIG: &str = "[wheel]\nradius_m = 0.3\ninertia_kg_m2 = 1.1\n\n[vehicle]\nmass_kg = 400.0\ncoasting = false\n\n\
                    [tyre]\nlaw = \"rudd\"\npeak_friction = 0.8\ncritical_slip = 0.12\n";
@@ -69,12 +73,12 @@ fn measure(
     work: &Path,
     what: &str,
     (runs, samples): (usize, usize),
-    bars: (f64, Option<f64>),
+    number: usize,
 ) -> Result<Pace> {
     fs::create_dir_all(work).with_context(|| format!("cannot make {}", work.display()))?;
     let rig = work.join("rig.toml");
     fs::write(&rig, RIG)?;
-    let mut draw = Draw::new(4, &[runs as u64, samples as u64]);
+    let mut draw = Draw::new(4, &[runs as u64, samples as u64, number as u64]);
     let mut files: Vec<PathBuf> = Vec::new();
     for number in 0..runs {
         let path = work.join(format!("run{number:02}.csv"));
@@ -99,29 +103,88 @@ fn measure(
         cost,
         load,
         complaint: outcome.err(),
-        bars,
     })
 }
 
-/// Measures six runs, and ten million samples where asked for.
-pub fn paces(tool: &Tool, work: &Path, ten_million: bool) -> Result<Vec<Pace>> {
-    let mut found = vec![measure(
-        tool,
-        &work.join("six"),
-        "six runs of 5,000 samples",
-        (6, 5000),
-        (2.0, None),
-    )?];
+/// Measures so many campaigns of six runs, and ten million samples where asked for.
+pub fn paces(tool: &Tool, work: &Path, six: usize, ten_million: bool) -> Result<Vec<Pace>> {
+    let mut found = Vec::new();
+    for number in 0..six {
+        found.push(measure(tool, &work.join("six"), SIX, (6, 5000), number)?);
+    }
     if ten_million {
         found.push(measure(
             tool,
             &work.join("ten-million"),
-            "ten runs of 1,000,000 samples",
+            TEN_MILLION,
             (10, 1_000_000),
-            (60.0, Some(1024.0 * 1024.0 * 1024.0)),
+            0,
         )?);
     }
     Ok(found)
+}
+
+/// Wall times and memory beside their bars.
+pub fn headlines(paces: &[Pace]) -> Vec<Headline> {
+    let times = |what: &str| -> Vec<f64> {
+        paces
+            .iter()
+            .filter(|pace| pace.what == what)
+            .map(|pace| {
+                if pace.complaint.is_some() {
+                    f64::INFINITY
+                } else {
+                    pace.cost.wall_s
+                }
+            })
+            .collect()
+    };
+    let seconds = |key: &str, what: String, bar: f64, values: &[f64], at: f64| Headline {
+        unit: Unit::Seconds,
+        ..Headline::quantile(key, &what, Better::Lower, Some(bar), values, at)
+    };
+    let six = times(SIX);
+    let mut found = vec![
+        seconds(
+            "pace.median",
+            format!("{SIX}, two threads: median"),
+            1.5,
+            &six,
+            0.5,
+        ),
+        seconds(
+            "pace.p95",
+            "the same, 95th percentile".into(),
+            3.0,
+            &six,
+            0.95,
+        ),
+        seconds("pace.worst", "the same, worst".into(), 6.0, &six, 1.0),
+    ];
+    let long = times(TEN_MILLION);
+    if !long.is_empty() {
+        found.push(seconds(
+            "pace.long",
+            format!("{TEN_MILLION}, two threads"),
+            60.0,
+            &long,
+            0.5,
+        ));
+        let memory = paces
+            .iter()
+            .filter(|pace| pace.what == TEN_MILLION)
+            .map(|pace| pace.cost.peak_bytes / GIB)
+            .fold(0.0, f64::max);
+        found.push(Headline::number(
+            "pace.long_gib",
+            "the same, peak memory, GiB",
+            Better::Lower,
+            Some(1.0),
+            (memory, f64::NAN, f64::NAN),
+            1,
+        ));
+    }
+    found
 }
 
 /// The table of the pages.
@@ -130,36 +193,31 @@ pub fn table(paces: &[Pace]) -> Table {
         "Speed, two threads",
         &[
             "recordings",
-            "bar",
-            "wall time",
-            "processor time",
+            "n",
+            "wall time, median",
+            "processor time, median",
             "peak memory",
             "busy processes before",
-            "met",
         ],
     );
-    for pace in paces {
-        let gib = 1024.0 * 1024.0 * 1024.0;
-        let (wall, memory) = pace.bars;
-        let met = pace.complaint.is_none()
-            && pace.cost.wall_s <= wall
-            && memory.is_none_or(|memory| pace.cost.peak_bytes <= memory);
+    for what in [SIX, TEN_MILLION] {
+        let group: Vec<&Pace> = paces.iter().filter(|pace| pace.what == what).collect();
+        if group.is_empty() {
+            continue;
+        }
+        let middle = |value: &dyn Fn(&Pace) -> f64| {
+            quantile(
+                &group.iter().map(|pace| value(pace)).collect::<Vec<_>>(),
+                0.5,
+            )
+        };
         table.row([
-            pace.what.clone(),
-            format!(
-                "<= {wall} s{}",
-                memory.map_or_else(String::new, |m| format!(", <= {} GiB", m / gib))
-            ),
-            format!("{:.2} s", pace.cost.wall_s),
-            format!("{:.2} s", pace.cost.processor_s),
-            format!("{:.2} GiB", pace.cost.peak_bytes / gib),
-            pace.load
-                .map_or_else(|| "-".to_owned(), |load| format!("{load:.1}")),
-            match &pace.complaint {
-                Some(complaint) => format!("**missed**: {complaint}"),
-                None if met => "met".to_owned(),
-                None => "**missed**".to_owned(),
-            },
+            what.to_owned(),
+            group.len().to_string(),
+            format!("{:.2} s", middle(&|pace| pace.cost.wall_s)),
+            format!("{:.2} s", middle(&|pace| pace.cost.processor_s)),
+            format!("{:.2} GiB", middle(&|pace| pace.cost.peak_bytes / GIB)),
+            format!("{:.1}", middle(&|pace| pace.load.unwrap_or(f64::NAN))),
         ]);
     }
     table.note = Some(

@@ -8,34 +8,44 @@ use anyhow::{Context, Result};
 
 use crate::judge::case::Case;
 use crate::judge::cause::{shortfalls, symptom};
+use crate::judge::headline::Headline;
 use crate::judge::score::Report;
-use crate::judge::{bars, rivals, tally};
+use crate::judge::{bars, calibration, coverage, power, prediction, rivals, tally, uniform};
+use crate::report::plots;
+use crate::report::seal::voids;
 use crate::table::Table;
 
 /// What the pages tell beside the judged campaigns.
 pub struct Telling<'a> {
     pub introduction: String,
+    pub figures: &'a [Headline],
+    /// Cases that count, and those of void forms.
+    pub valid: &'a [Case],
+    pub void: &'a [Case],
     pub report: &'a Report,
-    pub ablations: &'a Table,
+    /// An earlier engine's cases, on every so manieth campaign.
+    pub rival: Option<(usize, &'a [Case])>,
     pub pace: &'a Table,
-    pub measured: &'a [Table],
     /// What people found out about single cases: campaign's number and the cause.
     pub notes: &'a [(String, String)],
 }
 
-/// Writes `trials.md` and the long tables into `trials/` beside it.
+/// Writes `trials.md`, and long tables and pictures into `trials/` beside it.
 pub fn write(directory: &Path, telling: &Telling<'_>) -> Result<()> {
     let beside = directory.join("trials");
     fs::create_dir_all(&beside).with_context(|| format!("cannot make {}", beside.display()))?;
     let put = |name: &Path, text: String| {
         fs::write(name, text).with_context(|| format!("cannot write {}", name.display()))
     };
+    plots::reliability(telling.valid, &beside.join("reliability.svg"))?;
+    plots::power(telling.valid, &beside.join("power.svg"))?;
+    plots::uniformity(telling.valid, &beside.join("null-p-values.svg"))?;
     put(&directory.join("trials.md"), front(telling))?;
     put(
         &beside.join("confusion.md"),
         format!(
             "# What was named for what\n\nPart of the [sealed trial](../trials.md).\n\n{}",
-            tally::confusion(&telling.report.cases).markdown()
+            tally::confusion(telling.valid).markdown()
         ),
     )?;
     put(&beside.join("cases.csv"), cases_csv(&telling.report.cases))?;
@@ -47,25 +57,42 @@ pub fn write(directory: &Path, telling: &Telling<'_>) -> Result<()> {
 }
 
 fn front(telling: &Telling<'_>) -> String {
-    let cases = &telling.report.cases;
+    let cases = telling.valid;
     let mut text = telling.introduction.clone();
-    let mut tables = vec![bars::bars(cases), telling.pace.clone(), shortfalls(cases)];
-    tables.extend(telling.measured.iter().cloned());
-    if !telling.report.baselines.is_empty() {
-        tables.push(rivals::baselines(cases, &telling.report.baselines));
-    }
-    tables.push(telling.ablations.clone());
-    tables.extend([
-        tally::nulls(cases),
-        tally::mechanisms(cases),
-        tally::strengths(cases),
-        tally::outside(cases),
-        tally::calibration(cases),
-        tally::pulls(cases),
-    ]);
-    for table in tables.iter().filter(|table| !table.rows.is_empty()) {
-        text.push_str(&table.markdown());
-    }
+    add(
+        &mut text,
+        vec![
+            bars::table("Figures and bars", telling.figures),
+            telling.pace.clone(),
+            void_table(telling),
+            shortfalls(cases),
+            tally::nulls(cases),
+            tally::chains(cases),
+            tally::strengths(cases),
+        ],
+    );
+    text.push_str("![Share of effects found against their size, at one false alarm in twenty](trials/power.svg)\n\n");
+    add(&mut text, vec![power::table(cases), uniform::table(cases)]);
+    text.push_str("![Null p-values by family of chain](trials/null-p-values.svg)\n\n");
+    text.push_str(
+        "![Of the calls at a confidence, how many were right](trials/reliability.svg)\n\n",
+    );
+    add(
+        &mut text,
+        vec![
+            calibration::table(cases),
+            coverage::table(cases),
+            prediction::table(cases),
+        ],
+    );
+    add(
+        &mut text,
+        vec![
+            tally::mechanisms(cases),
+            tally::outside(cases),
+            methods(telling),
+        ],
+    );
     text.push_str(
         "## Long tables\n\n\
          - [Confusion matrix](trials/confusion.md)\n\
@@ -89,6 +116,66 @@ fn front(telling: &Telling<'_>) -> String {
     text
 }
 
+/// The tool beside an earlier engine and the textbook.
+fn methods(telling: &Telling<'_>) -> Table {
+    let counts: Vec<_> = telling
+        .report
+        .baselines
+        .iter()
+        .filter(|(truth, _)| {
+            telling
+                .valid
+                .iter()
+                .any(|case| case.campaign == truth.campaign)
+        })
+        .cloned()
+        .collect();
+    let name = telling
+        .rival
+        .map(|(every, _)| format!("the engine of commit 6b77987, every {every}th campaign"));
+    let others: Vec<(&str, &[Case])> = name
+        .as_deref()
+        .zip(telling.rival)
+        .map(|(name, (_, cases))| (name, cases))
+        .into_iter()
+        .collect();
+    rivals::baselines(telling.valid, &counts, &others)
+}
+
+/// Appends the tables that have rows.
+fn add(text: &mut String, tables: Vec<Table>) {
+    for table in tables.iter().filter(|table| !table.rows.is_empty()) {
+        text.push_str(&table.markdown());
+    }
+}
+
+/// Forms that no figure counts, the rule that was made for each, and what they would have given.
+fn void_table(telling: &Telling<'_>) -> Table {
+    let mut table = Table::new(
+        "Void forms",
+        &["form", "rule that was made for it", "campaigns", "right"],
+    );
+    for void in voids() {
+        let group: Vec<&Case> = telling
+            .void
+            .iter()
+            .filter(|case| case.forms.contains(&void.form))
+            .collect();
+        let right = group.iter().filter(|case| !case.failed()).count();
+        table.row([
+            void.form.clone(),
+            void.why,
+            group.len().to_string(),
+            right.to_string(),
+        ]);
+    }
+    table.note = Some(
+        "The engine has a rule that was made after the form was seen in a trial: figures from it prove nothing and are left out of all others."
+            .to_owned(),
+    );
+    table
+}
+
 fn quoted(text: &str) -> String {
     if text.contains([',', '"', '\n']) {
         format!("\"{}\"", text.replace('"', "\"\""))
@@ -99,13 +186,15 @@ fn quoted(text: &str) -> String {
 
 fn cases_csv(cases: &[Case]) -> String {
     let mut text = String::from(
-        "campaign,stratum,kind,concealed,forms,size_sigma,verdict,named,confidence,left,first_right,in_set,f1,honest,variable_right,iou,gain_shares,worse,processor_s,samples,what_went_wrong\n",
+        "campaign,stratum,wheel_sensor,vehicle_sensor,kind,concealed,forms,size_sigma,verdict,named,confidence,left,first_right,in_set,f1,honest,variable_right,iou,gain_shares,worse,processor_s,samples,what_went_wrong\n",
     );
     let join = |items: Vec<String>| items.join(";");
     for case in cases {
         let cells = [
             case.campaign.clone(),
             case.stratum.clone(),
+            case.wheel_sensor.clone(),
+            case.vehicle_sensor.clone(),
             case.kind.clone(),
             join(case.truth.clone()),
             join(case.forms.clone()),

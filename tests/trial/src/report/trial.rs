@@ -6,16 +6,18 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result, bail};
 use sha2::{Digest, Sha256};
 
-use crate::generate::TEXT;
 use crate::generate::files::{generate, seal};
 use crate::generate::strata::Request;
+use crate::generate::{TEXT, instrument};
 use crate::judge::case::Case;
-use crate::judge::rivals;
+use crate::judge::headline::Headline;
 use crate::judge::score::{Report, ScoreRequest, score};
+use crate::judge::{bars, certainty};
 use crate::real;
 use crate::report::pace::{self, Pace};
 use crate::report::pages::{self, Telling};
-use crate::table::Table;
+use crate::report::ratchet;
+use crate::report::seal::{SeedUse, Void, enter, seed_use, voids};
 use crate::tool::Tool;
 
 /// What a trial is made with.
@@ -23,10 +25,16 @@ use crate::tool::Tool;
 pub struct Trial {
     /// The tool under trial.
     pub tool: Tool,
-    /// Seed of every draw; development uses seeds below 1000, reported figures others.
+    /// An earlier engine, tried on a part of the same files.
+    pub rival: Option<PathBuf>,
+    /// Commit that the tool was built from, where it was built from one and nothing else.
+    pub commit: Option<String>,
+    /// Seed of every draw; see [`SeedUse`].
     pub seed: u64,
-    /// A few campaigns only, and loose bars that must hold, for continuous integration.
+    /// A tenth of the campaigns, held against the ratchet.
     pub small: bool,
+    /// Write the ratchet anew instead of holding against it.
+    pub bless: bool,
     /// Campaigns of each stratum, as a share of the full trial's.
     pub scale: f64,
     /// Scratch directory for campaigns and answers; what is there of the same trial is not made again.
@@ -37,57 +45,56 @@ pub struct Trial {
     pub data: PathBuf,
     /// Campaigns at the same time.
     pub jobs: usize,
-    /// Every so manieth campaign is diagnosed again with each part of the argument left out; none where zero.
-    pub ablate_every: usize,
     /// Ten million samples are diagnosed too, which takes gigabytes of disk and of memory.
     pub ten_million: bool,
 }
 
-/// Parts that `muslip diagnose --ablate` can leave out.
-const PARTS: [(&str, &str); 3] = [
-    ("prefilter", "no common prefilter"),
-    ("errors-in-variables", "no errors-in-variables correction"),
-    ("remainder", "no remainder"),
+/// Figures that may not get worse, and seeds that were reported on, from the project's root.
+const RATCHET: &str = ".ci/trial.toml";
+const LEDGER: &str = "docs/trials/seeds.txt";
+/// An earlier engine is tried on every so manieth campaign.
+const RIVAL_EVERY: usize = 4;
+/// The small trial's share of the whole.
+const SMALL: f64 = 0.1;
+
+/// Campaigns of each stratum at full size: whole rounds of the kinds, mechanisms and effects of a chain, so that a
+/// bar can be told from its neighbour.
+const FULL: [(&str, bool, usize); 9] = [
+    ("null", true, 208),
+    ("null", false, 64),
+    ("chain", false, 52),
+    ("single", true, 116),
+    ("single", false, 116),
+    ("pair", true, 32),
+    ("pair", false, 40),
+    ("outside", true, 34),
+    ("outside", false, 51),
 ];
 
-/// Campaigns of each stratum: enough that a bar can be told from its neighbour, or just a taste.
-fn requests(trial: &Trial) -> Vec<Request> {
-    let request =
-        |stratum: &str, count: usize, mechanism: Option<&str>, strength: Option<f64>| Request {
-            stratum: stratum.to_owned(),
-            count,
-            mechanism: mechanism.map(Into::into),
-            strength,
-        };
-    if trial.small {
-        let mut requests = vec![
-            request("null", 3, None, None),
-            request("outside", 1, Some("out_column_zero"), Some(2.0)),
-        ];
-        requests.extend(
-            [
-                "force_delay",
-                "load_sensitivity",
-                "aero_drag",
-                "wheel_inertia",
-            ]
-            .map(|id| request("single", 1, Some(id), Some(2.0))),
-        );
-        return requests;
+impl Trial {
+    fn scale(&self) -> f64 {
+        if self.small { SMALL } else { self.scale }
     }
-    // Whole rounds of the kinds of null campaign, of the mechanisms and of the effects outside the vocabulary.
-    [
-        ("null", 15, 8),
-        ("single", 15, 27),
-        ("pair", 80, 1),
-        ("outside", 5, 17),
-    ]
-    .into_iter()
-    .map(|(stratum, rounds, kinds)| {
-        let rounds = (f64::from(rounds) * trial.scale).ceil().max(1.0) as usize;
-        request(stratum, rounds * kinds, None, None)
-    })
-    .collect()
+}
+
+fn requests(trial: &Trial) -> Vec<Request> {
+    FULL.into_iter()
+        .map(|(stratum, real_chain, count)| {
+            let kinds = match stratum {
+                // Every kind once, however small.
+                "chain" => instrument::finding::FINDING_KINDS.len(),
+                "null" if !real_chain => 8,
+                _ => 1,
+            };
+            Request {
+                stratum: stratum.to_owned(),
+                real_chain,
+                count: ((count as f64 * trial.scale()).ceil() as usize).max(kinds),
+                mechanism: None,
+                strength: None,
+            }
+        })
+        .collect()
 }
 
 fn digest<'a>(parts: impl IntoIterator<Item = &'a [u8]>) -> String {
@@ -104,9 +111,10 @@ fn digest<'a>(parts: impl IntoIterator<Item = &'a [u8]>) -> String {
 /// Generates, or takes up what an earlier call has generated whole; gives the hash of the sealed truth.
 fn campaigns(trial: &Trial, directory: &Path) -> Result<String> {
     let requests = requests(trial);
+    let generator = TEXT.iter().chain(instrument::TEXT);
     let plan = format!(
         "{} {} {requests:?}\n",
-        digest(TEXT.iter().map(|text| text.as_bytes())),
+        digest(generator.map(|text| text.as_bytes())),
         trial.seed
     );
     let (kept, told) = (directory.join("plan"), directory.join("sealed.sha256"));
@@ -128,8 +136,8 @@ fn campaigns(trial: &Trial, directory: &Path) -> Result<String> {
 /// Plays the trial.
 ///
 /// # Errors
-/// Where a file cannot be written, no rig can show an ordered effect, or the tool is missing; of a small
-/// trial also where its loose bars do not hold.
+/// Where a file cannot be written, no rig can show an ordered effect, the tool is missing, the seed is not for this
+/// use, or figures of the small trial got worse.
 pub fn trial(trial: &Trial) -> Result<Report> {
     // The tool as it is now: a build that goes on meanwhile must not change it under way.
     let (tool, program) = frozen(trial)?;
@@ -137,6 +145,7 @@ pub fn trial(trial: &Trial) -> Result<Report> {
         tool,
         ..trial.clone()
     };
+    admit(trial, &program)?;
     let directory = trial.work.join(if trial.small {
         format!("seed-{}-small", trial.seed)
     } else {
@@ -147,69 +156,119 @@ pub fn trial(trial: &Trial) -> Result<Report> {
     println!("tool sha256 {program}");
     // Answers of another tool or to other campaigns are other answers.
     let answers = directory.join(format!("answers-{}-{}", &hash[..12], &program[..12]));
-    let request = |tool: Tool, results: PathBuf, baselines: bool, every: usize| ScoreRequest {
+    let request = |tool: Tool, results: PathBuf, every: usize| ScoreRequest {
         tool,
         campaigns: directory.clone(),
         results,
         strata: vec![],
         only: None,
-        baselines,
+        baselines: every == 1,
         jobs: trial.jobs,
         reuse: true,
         every,
     };
-    let measured = if trial.small {
-        Vec::new()
-    } else {
-        real::trial(trial, &directory.join("measured"), &program[..12])?
-    };
+    let measured = real::study(trial, &directory.join("measured"), &program[..12])?;
     let paces = speeds(trial, &answers)?;
-    let report = score(&request(trial.tool.clone(), answers.clone(), true, 1))?;
-    let ablations = ablations(trial, &report, &|tool, name| {
-        request(
-            tool,
-            answers.with_extension(name),
-            false,
-            trial.ablate_every,
-        )
-    })?;
+    let report = score(&request(trial.tool.clone(), answers.clone(), 1))?;
+    let (valid, void) = without_void(&report.cases, &voids());
+    let rival = trial
+        .rival
+        .as_ref()
+        .map(|path| -> Result<Vec<Case>> {
+            let results = answers.with_extension("rival");
+            let tool = Tool {
+                path: path.clone(),
+                diagnose_arguments: vec![],
+            };
+            Ok(score(&request(tool, results, RIVAL_EVERY))?.cases)
+        })
+        .transpose()?;
+    let figures = figures(&valid, &paces, &measured.headlines);
+    print!("{}", bars::table("Figures and bars", &figures).text());
+    for table in &measured.tables {
+        print!("{}", table.text());
+    }
+    if trial.small {
+        ratchet::hold(Path::new(RATCHET), &figures, trial.bless)?;
+    }
     if let Some(pages) = &trial.pages {
         pages::write(
             pages,
             &Telling {
                 introduction: introduction(trial, &hash, &program, &report.cases),
+                figures: &figures,
+                valid: &valid,
+                void: &void,
                 report: &report,
-                ablations: &ablations,
+                rival: rival.as_deref().map(|cases| (RIVAL_EVERY, cases)),
                 pace: &pace::table(&paces),
-                measured: &measured,
                 notes: &pages::notes(&pages.join("trials").join("causes.txt"), &hash),
             },
         )?;
-    }
-    for table in measured.iter().chain([&ablations, &pace::table(&paces)]) {
-        if !table.rows.is_empty() {
-            print!("{}", table.text());
-        }
-    }
-    if trial.small {
-        loose(&report, &paces)?;
+        measured.write(pages)?;
     }
     Ok(report)
 }
 
-/// Plays the part with measured recordings alone; gives its tables.
+/// Every figure of the trial, in the order in which it is read.
+fn figures(cases: &[Case], paces: &[Pace], measured: &[Headline]) -> Vec<Headline> {
+    let mut found = bars::figures(cases);
+    found.extend(certainty(cases));
+    found.extend(measured.iter().cloned());
+    found.extend(pace::headlines(paces));
+    found
+}
+
+/// Whether the seed may be used for this, and by this tool.
+fn admit(trial: &Trial, program: &str) -> Result<()> {
+    let Some(used) = seed_use(trial.seed) else {
+        bail!(
+            "seed {} is for nothing: below 1000 to develop, 1000 to 1999 for continuous integration, from 20,000 to report",
+            trial.seed
+        );
+    };
+    match (used, trial.pages.is_some(), trial.small) {
+        (SeedUse::Reported, true, false) => {
+            let Some(commit) = &trial.commit else {
+                bail!(
+                    "figures are reported of a commit: --commit says which one the tool was built from (cargo xtask trial --report does)"
+                );
+            };
+            enter(Path::new(LEDGER), trial.seed, program, commit)
+        }
+        (SeedUse::Reported, _, _) => bail!(
+            "seed {} is for reports: a development seed is below 1000",
+            trial.seed
+        ),
+        (SeedUse::Integration, _, false) => {
+            bail!("seed {} is continuous integration's own", trial.seed)
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Cases that count, and those of forms that a rule was made for.
+fn without_void(cases: &[Case], voids: &[Void]) -> (Vec<Case>, Vec<Case>) {
+    cases.iter().cloned().partition(|case| {
+        !case
+            .forms
+            .iter()
+            .any(|form| voids.iter().any(|void| &void.form == form))
+    })
+}
+
+/// Plays the part with measured recordings alone.
 ///
 /// # Errors
 /// Where a file cannot be written or the tool is missing.
-pub fn only_measured(trial: &Trial) -> Result<String> {
+pub fn only_measured(trial: &Trial) -> Result<real::Study> {
     let (tool, program) = frozen(trial)?;
     let trial = Trial {
         tool,
         ..trial.clone()
     };
     let directory = trial.work.join(format!("seed-{}-measured", trial.seed));
-    let tables = real::trial(&trial, &directory, &program[..12])?;
-    Ok(tables.iter().map(Table::text).collect())
+    real::study(&trial, &directory, &program[..12])
 }
 
 /// A copy of the tool under its own hash, and the hash.
@@ -250,6 +309,7 @@ fn speeds(trial: &Trial, answers: &Path) -> Result<Vec<Pace>> {
     let found = pace::paces(
         &trial.tool,
         &trial.work.join("pace"),
+        if trial.small { 2 } else { 20 },
         trial.ten_million && !trial.small,
     )?;
     fs::create_dir_all(answers)?;
@@ -257,139 +317,110 @@ fn speeds(trial: &Trial, answers: &Path) -> Result<Vec<Pace>> {
     Ok(found)
 }
 
-fn ablations(
-    trial: &Trial,
-    report: &Report,
-    request: &dyn Fn(Tool, &str) -> ScoreRequest,
-) -> Result<Table> {
-    if trial.ablate_every == 0 || trial.small {
-        return Ok(Table::default());
-    }
-    let own: Vec<Case> = report
-        .cases
-        .iter()
-        .step_by(trial.ablate_every)
-        .cloned()
-        .collect();
-    let mut rows = vec![("nothing".to_owned(), Ok(own))];
-    for (part, name) in PARTS {
-        let mut tool = trial.tool.clone();
-        tool.diagnose_arguments
-            .extend(["--ablate".into(), part.into()]);
-        // A tool that cannot do without a part says so before it reads anything.
-        rows.push((
-            name.to_owned(),
-            match tool.refusal(&trial.work)? {
-                Some(why) => Err(why),
-                None => Ok(score(&request(tool, part))?.cases),
-            },
-        ));
-    }
-    let mut table = rivals::ablations(&rows);
-    table.note = Some(format!(
-        "Every {}th campaign by number, the same for all rows.",
-        trial.ablate_every
-    ));
-    Ok(table)
-}
-
-/// Bars that a small trial must clear: loose, since it is small, but none that a broken tool would clear.
-fn loose(report: &Report, paces: &[Pace]) -> Result<()> {
-    let cases = &report.cases;
-    let count = |stratum: &str, condition: &dyn Fn(&Case) -> bool| {
-        let all: Vec<&Case> = cases
-            .iter()
-            .filter(|case| case.stratum == stratum)
-            .collect();
-        (all.iter().filter(|case| condition(case)).count(), all.len())
-    };
-    let mut missed = Vec::new();
-    for case in cases.iter().filter(|case| !case.complaints.is_empty()) {
-        missed.push(format!("{}: {}", case.campaign, case.complaints.join("; ")));
-    }
-    let (alarms, nulls) = count("null", &|case| case.verdict != "consistent");
-    if alarms > 1 {
-        missed.push(format!(
-            "{alarms} of {nulls} null campaigns raised an alarm"
-        ));
-    }
-    let (right, singles) = count("single", &|case| case.in_set);
-    if right + 1 < singles {
-        missed.push(format!(
-            "only {right} of {singles} single effects of 2 sigma were named"
-        ));
-    }
-    let (honest, outside) = count("outside", &|case| case.honest);
-    if honest < outside {
-        missed.push("an effect outside the vocabulary was passed over".to_owned());
-    }
-    let gains: Vec<_> = cases
-        .iter()
-        .filter(|case| case.stratum == "single" && case.in_set)
-        .flat_map(|case| &case.gains)
-        .collect();
-    let worse = gains.iter().filter(|gain| gain.worse).count();
-    if 4 * worse > gains.len() {
-        missed.push(format!(
-            "{worse} of {} fresh runs predicted worse than by the base",
-            gains.len()
-        ));
-    }
-    for pace in paces {
-        if pace.complaint.is_some() || pace.cost.processor_s > 30.0 {
-            missed.push(format!(
-                "{}: {:.1} s of processor time {}",
-                pace.what,
-                pace.cost.processor_s,
-                pace.complaint.clone().unwrap_or_default()
-            ));
-        }
-    }
-    if !missed.is_empty() {
-        for case in cases {
-            eprintln!("{}", case.line());
-        }
-        bail!("the small trial failed: {}", missed.join("; "));
-    }
-    Ok(())
-}
-
 fn introduction(trial: &Trial, hash: &str, program: &str, cases: &[Case]) -> String {
-    let count = |stratum: &str| cases.iter().filter(|case| case.stratum == stratum).count();
+    let count = |stratum: &str, real: bool| {
+        cases
+            .iter()
+            .filter(|case| case.stratum == stratum && case.real_chain == real)
+            .count()
+    };
     format!(
         "# Sealed trial of the diagnosis\n\n\
-         Seed {}. {} campaigns ({} null, {} with one effect, {} with two, {} with an effect outside the vocabulary) were written by \
-         `tests/trial`, which shares no code and no tyre or sensor model with the engine; the SHA-256 of their sealed truth,\n\n\
-         `{hash}`,\n\n\
-         was printed before the first of them was diagnosed, by the tool whose SHA-256 is `{program}`. Written by \
-         `cargo xtask trial --seed {}{}{}`; none of it is edited by hand but the causes behind the worst cases (`trials/causes.txt`).\n\n\
+         Seed {}, {} campaigns, on ideal sensors and through real measuring chains: nothing missing {} and {}, one effect {} and {}, two {} \
+         and {}, one outside the vocabulary {} and {}; one effect of the chain alone {}. All were written by `tests/trial`, which shares no code \
+         and no tyre or sensor model with the engine. The SHA-256 of their sealed truth,\n\n`{hash}`,\n\n\
+         was printed before the first of them was diagnosed, by the tool whose SHA-256 is `{program}`, built from commit `{}`. Printed by\n\n\
+         ```\ncargo xtask trial {}\n```\n\n\
+         Seeds of reported figures are used once ([trials/seeds.txt](trials/seeds.txt)), not in development (below 1000) and not in \
+         continuous integration (1000 to 1999, a tenth of this trial, its figures held by `.ci/trial.toml`). Measured recordings have a page of \
+         their own: [reality.md](reality.md). How the bench is built: [design/0009](design/0009-bench.md).\n\n\
          How to read it:\n\n\
+         - Real chain: wheel speed by the period of a tone ring, by counts in a window or by a tachometer; vehicle speed by satellites, an \
+         optical sensor, a fifth wheel or a drum's encoder; filters, coloured noise, hum, steps and drift of the analogue channels; loggers \
+         out of step by up to 20 ms and 100 ppm; errors common to both speeds; runs that differ in zero, gain and peak friction. Drawn a \
+         campaign, kept over its runs.\n\
+         - False physics: a name that is neither concealed nor true of the measuring chain. A speed channel that is late by more than 1 ms \
+         may be named as such, a load cell's channel that lags the others by more than that as well, an encoder's ripple where the ring has one.\n\
          - Size of an effect: RMS of what it leaves in the residual of its balance, without random noise and after peak friction and \
          critical slip were refitted, in units of that balance's noise (tyre: drag, load and slip noise together; wheel and vehicle: drag \
-         and torque noise and that of an acceleration taken over 50 ms). The bars speak of 0.6 sigma and more; effects were ordered at \
-         0.3, 0.6, 1, 2 and 4.\n\
-         - Floor: mean squared error, against the load cell's reading without its random noise, of the truth itself (all effects, all \
-         figures) driven sample by sample with the fresh run's written inputs. Gain share: 1 - (MSE - floor)/(MSE of base - floor), on runs \
-         where the base's error exceeds the floor by a quarter; a model that smooths its inputs may exceed 1.\n\
+         and torque noise and that of an acceleration taken over 50 ms); through a real chain, of the chain's random errors. The bars speak of \
+         0.6 sigma and more; effects were ordered at 0.3, 0.6, 1, 1.5, 2 and 4.\n\
+         - Floor: mean squared error, against the load cell's reading without its random errors, of the truth itself (all effects, all \
+         parameters, known delays taken back) driven sample by sample with the fresh run's written inputs. Gain share: 1 - (MSE - floor)/(MSE \
+         of base - floor), on runs where the base's error exceeds the floor by a quarter; a model that smooths its inputs may exceed 1. Fresh \
+         runs stand first, between or last in the campaign's order.\n\
          - Location: intersection over union of the intervals in the balance of the concealed effect, single effects from 0.6 sigma; local \
          are patches, saturation, and whatever is off less than a quarter of the time.\n\
-         - A figure's pull: reported minus true, in its reported standard deviation; where the contract leaves the variable open, the nearer.\n\
-         - Intervals of shares: Clopper and Pearson, 95 %; of means: normal; of quantiles: order statistics. \"Spans the bar\" says that \
-         the interval does not tell the figure from its bar.\n\n\
+         - A parameter's attainable std: that of least squares with the true form under these recordings' own errors, coloured as they are; \
+         wheel and vehicle balances integrated, so that slow information counts.\n\
+         - Power: share of effects that are named first with a score (`delta_bic`) above the one that one null campaign in twenty exceeds.\n\
+         - Intervals of shares: Clopper and Pearson, 95 %; of means: normal; of quantiles: order statistics; of the Brier score and the power: \
+         campaigns drawn again. \"Spans the bar\" says that the interval does not tell the figure from its bar.\n\n\
          In the lists, `!` marks a name that is not concealed there, `~` what it was said to be confusable with, and `left(...)` the variables \
          of what was left unexplained.\n\n",
         trial.seed,
         cases.len(),
-        count("null"),
-        count("single"),
-        count("pair"),
-        count("outside"),
-        trial.seed,
-        if trial.small { " --small" } else { "" },
-        if (trial.scale - 1.0).abs() > 1e-12 && !trial.small {
-            format!(" --scale {}", trial.scale)
+        count("null", false),
+        count("null", true),
+        count("single", false),
+        count("single", true),
+        count("pair", false),
+        count("pair", true),
+        count("outside", false),
+        count("outside", true),
+        count("chain", false),
+        trial.commit.as_deref().unwrap_or("not stated"),
+        if trial.small {
+            "--small".to_owned()
         } else {
-            String::new()
+            format!("--report --seed {}", trial.seed)
         },
     )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn asked(seed: u64, small: bool, pages: bool, commit: Option<&str>) -> Trial {
+        Trial {
+            tool: Tool {
+                path: PathBuf::new(),
+                diagnose_arguments: vec![],
+            },
+            rival: None,
+            commit: commit.map(str::to_owned),
+            seed,
+            small,
+            bless: false,
+            scale: 1.0,
+            work: PathBuf::new(),
+            pages: pages.then(PathBuf::new),
+            data: PathBuf::new(),
+            jobs: 1,
+            ten_million: false,
+        }
+    }
+
+    #[test]
+    fn seeds_are_kept_to_their_use() {
+        let refused = |trial: &Trial| admit(trial, "aa").is_err();
+        assert!(!refused(&asked(7, false, true, None)));
+        assert!(!refused(&asked(1500, true, false, None)));
+        assert!(refused(&asked(1500, false, false, None)));
+        assert!(refused(&asked(20_300, false, false, None)));
+        assert!(refused(&asked(20_300, true, true, Some("c"))));
+        assert!(
+            refused(&asked(20_300, false, true, None)),
+            "of which commit?"
+        );
+        assert!(refused(&asked(5000, false, false, None)));
+    }
+
+    #[test]
+    fn a_small_trial_has_every_stratum() {
+        for request in requests(&asked(1500, true, false, None)) {
+            assert!(request.count >= 2, "{request:?}");
+        }
+    }
 }

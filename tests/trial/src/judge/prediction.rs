@@ -1,0 +1,151 @@
+//! Predictions of unseen runs: better than the base's, and as sure as they say.
+
+use crate::judge::case::{Case, GainCase};
+use crate::judge::family::{Family, families};
+use crate::judge::headline::{Better, Headline};
+use crate::share::{Share, mean, percent};
+use crate::table::Table;
+
+const PLACES: [&str; 3] = ["first", "middle", "last"];
+
+fn gains<'a>(cases: &'a [Case], family: Family, place: &str) -> Vec<&'a GainCase> {
+    family
+        .of(cases)
+        .flat_map(|case| &case.gains)
+        .filter(|gain| place.is_empty() || gain.place == place)
+        .collect()
+}
+
+/// Share of scored samples within the 90 % band, run by run.
+fn bands(gains: &[&GainCase]) -> Vec<f64> {
+    gains
+        .iter()
+        .filter(|gain| gain.in_band.1 > 0)
+        .map(|gain| gain.in_band.0 as f64 / gain.in_band.1 as f64)
+        .collect()
+}
+
+/// Predictions of unseen runs, by where they stand in their campaign.
+pub fn table(cases: &[Case]) -> Table {
+    let mut table = Table::new(
+        "Predictions of unseen runs",
+        &[
+            "sensors",
+            "runs",
+            "n",
+            "worse than base by 1 %",
+            "95 % interval",
+            "base worse than least squares",
+            "95 % interval",
+            "within the 90 % band",
+            "95 % interval",
+        ],
+    );
+    for family in families(cases) {
+        for place in PLACES.into_iter().chain([""]) {
+            let runs = gains(cases, family, place);
+            if runs.is_empty() {
+                continue;
+            }
+            let [worse, worse_interval, _] = Share::count(&runs, |gain| gain.worse).cells();
+            let [base, base_interval, _] = Share::count(&runs, |gain| gain.base_worse).cells();
+            let shares = bands(&runs);
+            let (band, error) = mean(&shares);
+            let (band, band_interval) = if shares.is_empty() {
+                ("-".to_owned(), "-".to_owned())
+            } else {
+                let (low, high) = (band - 1.96 * error, (band + 1.96 * error).min(1.0));
+                (
+                    percent(band),
+                    format!("{}..{}", percent(low), percent(high)),
+                )
+            };
+            table.row([
+                family.name().to_owned(),
+                if place.is_empty() { "all" } else { place }.to_owned(),
+                runs.len().to_string(),
+                worse,
+                worse_interval,
+                base,
+                base_interval,
+                band,
+                band_interval,
+            ]);
+        }
+    }
+    table
+}
+
+/// The figures for the bars and the ratchet.
+pub fn headlines(cases: &[Case]) -> Vec<Headline> {
+    use Better::{Higher, Lower};
+    let mut all = Vec::new();
+    for family in families(cases) {
+        let key = |stem: &str| family.key(stem);
+        let what = |words: &str| family.what(words);
+        for place in [""].into_iter().chain(PLACES) {
+            let runs = gains(cases, family, place);
+            let (end, of) = if place.is_empty() {
+                (String::new(), "unseen runs".to_owned())
+            } else {
+                (format!(".{place}"), format!("{place} runs unseen"))
+            };
+            all.push(Headline::share(
+                &key(&format!("predictions.worse{end}")),
+                &what(&format!("{of}: repaired worse than base by 1 %")),
+                Lower,
+                Some(0.005),
+                Share::count(&runs, |gain| gain.worse),
+            ));
+            if place.is_empty() {
+                all.push(Headline::share(
+                    &key("predictions.base_worse"),
+                    &what(&format!("{of}: base worse than least squares by 1 %")),
+                    Lower,
+                    None,
+                    Share::count(&runs, |gain| gain.base_worse),
+                ));
+            }
+            all.push(Headline::mean(
+                &key(&format!("predictions.band90{end}")),
+                &what(&format!("{of}: share within the 90 % band")),
+                Higher,
+                None,
+                &bands(&runs),
+            ));
+        }
+    }
+    all
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::judge::family::toy;
+
+    #[test]
+    fn predictions_are_told_by_place() {
+        let mut case = toy::case("single", false);
+        case.gains = PLACES
+            .iter()
+            .map(|place| GainCase {
+                file: String::new(),
+                repaired: 1.0,
+                base: 1.0,
+                floor: 0.0,
+                floor_best: 0.0,
+                share: None,
+                share_of_best: None,
+                worse: *place == "first",
+                base_worse: false,
+                place: (*place).to_owned(),
+                in_band: (if *place == "last" { 80 } else { 100 }, 100),
+            })
+            .collect();
+        let told = headlines(&[case]);
+        assert!((toy::value(&told, "predictions.worse") - 1.0 / 3.0).abs() < 1e-12);
+        assert!((toy::value(&told, "predictions.worse.first") - 1.0).abs() < 1e-12);
+        assert!((toy::value(&told, "predictions.band90") - 2.8 / 3.0).abs() < 1e-12);
+        assert!((toy::value(&told, "predictions.band90.last") - 0.8).abs() < 1e-12);
+    }
+}
