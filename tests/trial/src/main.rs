@@ -140,7 +140,7 @@ struct RunArguments {
     /// With --small: write .ci/trial.toml anew instead.
     #[arg(long, requires = "small")]
     bless: bool,
-    /// Campaigns as a share of the full trial's 713.
+    /// Campaigns as a share of the full trial's 585.
     #[arg(long, default_value_t = 1.0)]
     scale: f64,
     /// An earlier engine, tried on every fourth campaign.

@@ -16,7 +16,7 @@ use crate::generate::chain::Readings;
 use crate::generate::measure::{Base, base_drag, usable};
 use crate::generate::rig::{BrakeColumn, Rig};
 
-/// Length of a block, s: longer than most errors are correlated.
+/// Length of a block, s, where errors are white or nearly so; a whole run where they are not.
 const BLOCK_S: f64 = 0.5;
 
 /// One run: as ideal instruments read it, with the effect a step stronger, and with the channels' random errors.
@@ -27,19 +27,19 @@ pub struct Shown<'a> {
 }
 
 /// Sums over blocks of the score Σ u e/S, and the information Σ u²/S.
-#[derive(Default)]
 struct Sums {
     information: f64,
     variance: f64,
     block: f64,
     until: f64,
+    block_s: f64,
 }
 
 impl Sums {
     fn add(&mut self, time: f64, effect: f64, error: f64, variance: f64) {
         if time > self.until {
             self.close();
-            self.until = time + BLOCK_S;
+            self.until = time + self.block_s;
         }
         self.information += effect * effect / variance;
         self.block += effect * error / variance;
@@ -53,9 +53,21 @@ impl Sums {
 }
 
 /// Standard deviation of the strength in units of the step between the plain and the nudged runs; not a number where
-/// the runs do not show it.
-pub fn attainable_std(balance: &str, rig: &Rig, base: Base, runs: &[Shown<'_>]) -> f64 {
-    let mut sums = Sums::default();
+/// the runs do not show it. Where errors are `correlated` over longer than a block, or runs differ, a run is a block.
+pub fn attainable_std(
+    balance: &str,
+    rig: &Rig,
+    base: Base,
+    runs: &[Shown<'_>],
+    correlated: bool,
+) -> f64 {
+    let mut sums = Sums {
+        information: 0.0,
+        variance: 0.0,
+        block: 0.0,
+        until: f64::NEG_INFINITY,
+        block_s: if correlated { f64::INFINITY } else { BLOCK_S },
+    };
     if balance == "tyre" {
         tyre(rig, base, runs, &mut sums);
     } else {
@@ -267,7 +279,7 @@ mod tests {
                 erring,
             })
             .collect();
-        let std = attainable_std("vehicle", &rig, base, &runs);
+        let std = attainable_std("vehicle", &rig, base, &runs, false);
         // Variance of a slope through n points at spacing dt: 12 sigma² / (dt² n³); the step is 1 N.
         let slope = (12.0 * 0.02f64.powi(2) / (0.01f64.powi(2) * 1000f64.powi(3)) / 30.0).sqrt();
         assert!(
@@ -313,7 +325,7 @@ mod tests {
                     erring,
                 })
                 .collect();
-            attainable_std("tyre", &rig, base, &runs)
+            attainable_std("tyre", &rig, base, &runs, false)
         };
         let (all, half) = (shown(&erring), shown(&erring[..20]));
         assert!((half / all / 2f64.sqrt() - 1.0).abs() < 0.15, "{half} {all}");

@@ -397,7 +397,9 @@ fn attempt_once(
         .iter()
         .zip(bench.fitted())
         .zip(&fit)
-        .map(|((plain, index), recorded)| erring(&rig, plain, &rides[index], &recorded.written))
+        .map(|((plain, index), recorded)| {
+            erring(&rig, plain, (&rides[index], spread[index]), &recorded.written)
+        })
         .collect();
     let mut concealed = Vec::new();
     for (place, effect) in effects.iter().enumerate() {
@@ -416,7 +418,8 @@ fn attempt_once(
                 erring,
             })
             .collect();
-        let std = attainable_std(&effect.balance, &rig, base_refitted, &shown)
+        let correlated = order.chain == ChainKind::Real;
+        let std = attainable_std(&effect.balance, &rig, base_refitted, &shown, correlated)
             * (NUDGE * effect.a).abs();
         let with_more = figures::figures(&more[place], &rig, &scale, &ridden);
         for (figure, more) in told.figures.iter_mut().zip(with_more) {
@@ -424,7 +427,9 @@ fn attempt_once(
                 0.0,
                 |(before, after)| (after - before) / (NUDGE * effect.a),
             );
-            figure.attainable_std = (slope != 0.0 && std.is_finite()).then(|| slope.abs() * std);
+            // A nudge moves a hold's steps through the run: the difference is no derivative.
+            figure.attainable_std = (slope != 0.0 && std.is_finite() && !effect.form.holds())
+                .then(|| slope.abs() * std);
         }
         concealed.push(told);
     }
@@ -493,8 +498,14 @@ const NUDGE: f64 = 0.03;
 /// Header of a column that copies the drag.
 const LEAKING_COLUMN: &str = "frame_force_n";
 
-/// Ideal readings with the random errors of a run's channels: what was written less what the chain does to any signal.
-fn erring(rig: &Rig, plain: &Readings, ride: &Ride, written: &Written) -> Readings {
+/// Ideal readings with the random errors of a run's channels (what was written less what the chain does to any signal),
+/// and with what the run differs by.
+fn erring(
+    rig: &Rig,
+    plain: &Readings,
+    (ride, spread): (&Ride, RunSpread),
+    written: &Written,
+) -> Readings {
     let add = |plain: &[f64], written: &[f64], expected: &[f64]| -> Vec<f64> {
         plain
             .iter()
@@ -529,7 +540,13 @@ fn erring(rig: &Rig, plain: &Readings, ride: &Ride, written: &Written) -> Readin
             .collect(),
         wheel: with(&plain.wheel, &written.wheel, &clean.wheel, |c| &c.wheel),
         speed: with(&plain.speed, &written.speed, &clean.speed, |c| &c.speed),
-        drag: with(&plain.drag, &written.drag, &clean.drag, |c| &c.drag),
+        drag: with(&plain.drag, &written.drag, &clean.drag, |c| &c.drag)
+            .iter()
+            .zip(&plain.drag)
+            .map(|(reading, drag)| {
+                reading + drag * (spread.gain + spread.friction) + spread.zero_n
+            })
+            .collect(),
         load: with(&plain.load, &written.load, &clean.load, |c| &c.load),
         torque: with(&plain.torque, &brake, torque, |c| &c.brake),
         command: with(&plain.command, &brake, torque, |c| &c.brake),
@@ -728,8 +745,8 @@ impl Bench<'_> {
             let mut channels = (manner == Manner::Recorded && self.instruments.acts())
                 .then(|| (Channels::default(), Channels::default()));
             for (number, stretch) in motion.stretches.iter().enumerate() {
-                let samples =
-                    ((stretch.end() - stretch.start) * self.rig.rate_hz).floor() as usize + 1;
+                let recorded_s = stretch.end() - stretch.start - self.instruments.ahead_s();
+                let samples = (recorded_s * self.rig.rate_hz).floor().max(0.0) as usize + 1;
                 let times: Vec<f64> = (0..samples)
                     .map(|k| {
                         let shift = if self.rig.jitter && k > 0 && k + 1 < samples {

@@ -60,9 +60,9 @@ impl Chain<'_> {
             time: times.to_vec(),
             wheel: match timing {
                 Some(effect) => pulse_timing(effect, stretch, times, self.scale.rate_hz),
-                None => pick(&self.wheel(stretch)),
+                None => pick(&self.late_wheel(&self.wheel(stretch), stretch.dt)),
             },
-            speed: pick(&self.speed(stretch)),
+            speed: pick(&self.late_vehicle(&self.speed(stretch), stretch)),
             drag: pick(&self.drag(stretch)),
             load: pick(&self.load(stretch)),
             torque: pick(&stretch.torque),
@@ -73,20 +73,29 @@ impl Chain<'_> {
         }
     }
 
-    /// All channels on the fine grid, for instruments of their own.
+    /// All channels on the fine grid, for instruments of their own; what makes a speed late is left to these.
     pub fn seen(&self, stretch: &Stretch, pressure: bool) -> Seen {
-        let angle: Vec<f64> = stretch
-            .angle
+        let speed = self.speed(stretch);
+        let banded = self
+            .effects
             .iter()
-            .map(|angle| angle + self.effects.iter().map(|e| shift(e, *angle)).sum::<f64>())
-            .collect();
-        Seen {
+            .any(|effect| effect.form == Form::OutSpeedBand);
+        let mut seen = Seen {
             start: stretch.start,
             dt: stretch.dt,
             wheel: self.wheel(stretch),
-            angle: self.late_wheel(&angle, stretch.dt),
-            speed: self.speed(stretch),
-            distance: self.late_vehicle(&stretch.distance, stretch),
+            angle: stretch
+                .angle
+                .iter()
+                .map(|angle| angle + self.effects.iter().map(|e| shift(e, *angle)).sum::<f64>())
+                .collect(),
+            // What a sensor counts is the path of the speed that it meets.
+            distance: if banded {
+                path(&speed, stretch.dt)
+            } else {
+                stretch.distance.clone()
+            },
+            speed,
             drag: self.drag(stretch),
             load: self.load(stretch),
             brake: if pressure {
@@ -94,7 +103,21 @@ impl Chain<'_> {
             } else {
                 stretch.torque.clone()
             },
+            ..Seen::default()
+        };
+        for effect in self.effects {
+            match effect.form {
+                Form::WheelLate => seen.wheel_late.pure_s += effect.a,
+                Form::WheelLateWindow => seen.wheel_late.window_s += 2.0 * effect.a,
+                Form::VehicleLate => seen.vehicle_late.pure_s += effect.a,
+                Form::VehicleLateHeld => {
+                    seen.vehicle_late.pure_s += (1.0 - HELD_SHARE) * effect.a;
+                    seen.vehicle_late.hold_s += HELD_SHARE * 2.0 * effect.a;
+                }
+                _ => {}
+            }
         }
+        seen
     }
 
     /// The wheel's speed as its sensor meets it.
@@ -107,9 +130,10 @@ impl Chain<'_> {
                 }
             }
         }
-        self.late_wheel(&wheel, stretch.dt)
+        wheel
     }
 
+    /// The same as an ideal sensor reads it.
     fn late_wheel(&self, values: &[f64], dt: f64) -> Vec<f64> {
         let mut out = values.to_vec();
         for effect in self.effects {
@@ -133,9 +157,10 @@ impl Chain<'_> {
                 }
             }
         }
-        self.late_vehicle(&speed, stretch)
+        speed
     }
 
+    /// The same as an ideal sensor reads it.
     fn late_vehicle(&self, values: &[f64], stretch: &Stretch) -> Vec<f64> {
         let mut out = values.to_vec();
         for effect in self.effects {
@@ -321,6 +346,19 @@ fn shift(effect: &Effect, angle: f64) -> f64 {
         Form::RippleTiming => effect.a * (angle + effect.p[0]).sin(),
         _ => 0.0,
     }
+}
+
+/// The path of a speed.
+fn path(speed: &[f64], dt: f64) -> Vec<f64> {
+    let mut sum = 0.0;
+    (0..speed.len())
+        .map(|index| {
+            if index > 0 {
+                sum += 0.5 * dt * (speed[index] + speed[index - 1]);
+            }
+            sum
+        })
+        .collect()
 }
 
 /// The same signal so much later, the first value held before it.

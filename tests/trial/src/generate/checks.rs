@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use crate::draw::Draw;
-use crate::generate::campaign::{Campaign, NULL_KINDS, NullKind, Order, make};
+use crate::generate::campaign::{Campaign, FreshTruth, NULL_KINDS, NullKind, Order, make};
 use crate::generate::form::Needs;
 use crate::generate::form::{OUTSIDE, VOCABULARY};
 use crate::generate::instrument::finding::{FINDING_KINDS, FindingKind};
@@ -229,6 +229,13 @@ fn nothing_is_missing_behind_a_real_chain_and_its_errors_have_the_size_that_coun
         let ratio = rms(errors.iter()) / truth.rig.sigmas.drag_force_n;
         // Slow noise differs from ride to ride.
         assert!((0.5..2.0).contains(&ratio), "seed {seed}: {ratio}");
+        // The truth with the chain's delays taken back predicts no worse than the base without.
+        let sum = |of: fn(&FreshTruth) -> f64| truth.fresh.iter().map(of).sum::<f64>();
+        let (floor, base) = (sum(|fresh| fresh.floor_best), sum(|fresh| fresh.base));
+        assert!(
+            floor < 1.05 * base,
+            "seed {seed}: floor {floor}, base {base}"
+        );
         // What the chain does to the drag is small beside the drag, but it is something.
         let off: Vec<f64> = campaign
             .fit

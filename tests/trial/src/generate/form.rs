@@ -476,6 +476,11 @@ impl Form {
         )
     }
 
+    /// Whether the effect holds values, so that what it does is no smooth function of its strength.
+    pub fn holds(self) -> bool {
+        matches!(self, F::DelayHold | F::VehicleLateHeld)
+    }
+
     /// Whether the effect depends on how many runs were driven before.
     pub fn of_the_order(self) -> bool {
         matches!(

@@ -61,14 +61,14 @@ const SMALL: f64 = 0.1;
 /// bar can be told from its neighbour.
 const FULL: [(&str, bool, usize); 9] = [
     ("null", true, 208),
-    ("null", false, 64),
-    ("chain", false, 52),
-    ("single", true, 116),
-    ("single", false, 116),
-    ("pair", true, 32),
-    ("pair", false, 40),
+    ("null", false, 48),
+    ("chain", false, 39),
+    ("single", true, 87),
+    ("single", false, 87),
+    ("pair", true, 24),
+    ("pair", false, 24),
     ("outside", true, 34),
-    ("outside", false, 51),
+    ("outside", false, 34),
 ];
 
 impl Trial {

@@ -6,6 +6,7 @@ use super::Seen;
 use super::colour::Colour;
 use crate::draw::Draw;
 use crate::generate::chain::{at, low_pass};
+use crate::generate::measure::rms;
 use crate::generate::rig::{Rig, RigKind};
 
 /// One analogue channel; the default is ideal and noiseless.
@@ -15,6 +16,8 @@ pub struct Analogue {
     pub pole_s: f64,
     pub poles: usize,
     pub noise: Colour,
+    /// Share of the noise's variance that arises before the filter, and so has its bandwidth.
+    pub filtered_noise: f64,
     pub hum: f64,
     pub hum_hz: f64,
     /// Relative gain gained a second.
@@ -77,6 +80,11 @@ impl Analogue {
                     time_constant_s: draw.log_between(0.02, 0.3),
                     flicker,
                 },
+                filtered_noise: if filtered && draw.chance(0.6) {
+                    draw.between(0.2, 0.9)
+                } else {
+                    0.0
+                },
                 hum: if hum {
                     sigma * draw.between(0.1, 0.8)
                 } else {
@@ -112,7 +120,21 @@ impl Analogue {
 
     /// Noise, hum and the converter's steps.
     pub fn add_errors(&self, values: &mut [f64], times: &[f64], period: f64, draw: &mut Draw) {
-        let noise = self.noise.series(values.len(), period, draw);
+        let mut noise = self.noise.series(values.len(), period, draw);
+        if self.filtered_noise > 0.0 && self.pole_s > 0.0 {
+            let mut before: Vec<f64> = (0..values.len()).map(|_| draw.normal()).collect();
+            for _ in 0..self.poles {
+                before = low_pass(&before, period, self.pole_s);
+            }
+            let size = rms(before.iter()).max(1e-12);
+            let (old, new) = (
+                (1.0 - self.filtered_noise).sqrt(),
+                self.filtered_noise.sqrt() * self.noise.std / size,
+            );
+            for (value, before) in noise.iter_mut().zip(before) {
+                *value = old * *value + new * before;
+            }
+        }
         let phase = draw.between(0.0, std::f64::consts::TAU);
         for ((value, error), time) in values.iter_mut().zip(noise).zip(times) {
             *value += error + self.hum * (std::f64::consts::TAU * self.hum_hz * time + phase).sin();

@@ -64,6 +64,50 @@ pub struct Seen {
     pub load: Vec<f64>,
     /// Torque of the brake, or what its pressure stands for.
     pub brake: Vec<f64>,
+    /// By how much a concealed effect makes the readings of wheel and of vehicle speed late.
+    pub wheel_late: Late,
+    pub vehicle_late: Late,
+}
+
+/// How a channel's readings are late: a delay, a hold, a mean over a window.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Late {
+    pub pure_s: f64,
+    pub hold_s: f64,
+    pub window_s: f64,
+}
+
+/// Points at which the mean over a window is taken.
+const WINDOW_POINTS: usize = 9;
+
+impl Late {
+    /// A sensor's readings as late as this, whatever the sensor.
+    fn apply(self, start: f64, times: &[f64], read: impl Fn(&[f64]) -> Vec<f64>) -> Vec<f64> {
+        let shifted = |more: f64| -> Vec<f64> {
+            times
+                .iter()
+                .map(|time| {
+                    let held = if self.hold_s > 0.0 {
+                        start + ((time - start) / self.hold_s).floor() * self.hold_s
+                    } else {
+                        *time
+                    };
+                    held - self.pure_s - more
+                })
+                .collect()
+        };
+        if self.window_s <= 0.0 {
+            return read(&shifted(0.0));
+        }
+        let mut sum = vec![0.0; times.len()];
+        for point in 0..WINDOW_POINTS {
+            let share = (point as f64 + 0.5) / WINDOW_POINTS as f64;
+            for (sum, value) in sum.iter_mut().zip(read(&shifted(share * self.window_s))) {
+                *sum += value / WINDOW_POINTS as f64;
+            }
+        }
+        sum
+    }
 }
 
 impl Seen {
@@ -140,21 +184,21 @@ pub struct Instruments {
     pub drag: Analogue,
     pub load: Analogue,
     pub brake: Analogue,
-    /// By how much each logger is out of step, s; positive is later.
+    /// By how much each logger is out of step with that of drag and load, s; positive is later.
     pub wheel_late_s: f64,
     pub vehicle_late_s: f64,
-    pub analogue_late_s: f64,
+    pub brake_late_s: f64,
     /// How much faster the vehicle-speed logger's clock runs, relative.
     pub clock: f64,
     pub common: Option<Common>,
     pub spread: Spread,
     /// Coloured noise of the vehicle speed, m/s.
     pub vehicle_noise: Colour,
-    /// Correlation of an extra column that copies the drag, where there is one.
+    /// Whether an extra column copies the drag.
     pub leak: bool,
 }
 
-/// Delay that is one part of a chain, as the analogue channels see it.
+/// Least delay against the drag, s, at which a name of timing is true.
 const KNOWN_DELAY_S: f64 = 1e-3;
 
 impl Instruments {
@@ -169,7 +213,7 @@ impl Instruments {
             brake: Analogue::default(),
             wheel_late_s: 0.0,
             vehicle_late_s: 0.0,
-            analogue_late_s: 0.0,
+            brake_late_s: 0.0,
             clock: 0.0,
             common: None,
             spread: Spread::default(),
@@ -192,6 +236,9 @@ impl Instruments {
                     // Separate loggers, started by hand or by a trigger of their own.
                     chain.wheel_late_s = draw.between(-0.02, 0.02);
                     chain.vehicle_late_s = draw.between(-0.02, 0.02);
+                    if draw.chance(0.5) {
+                        chain.brake_late_s = draw.between(-0.02, 0.02);
+                    }
                 }
                 if draw.chance(0.25) {
                     chain.clock = draw.between(-1e-4, 1e-4);
@@ -234,15 +281,20 @@ impl Instruments {
             .iter()
             .map(|time| time - self.vehicle_late_s - self.clock * time)
             .collect();
-        let analogue_times = at(self.analogue_late_s);
+        let wheel_times = at(self.wheel_late_s);
+        let erring = errors.is_some();
         let mut channels = Channels {
-            wheel: self
-                .wheel
-                .read(seen, &at(self.wheel_late_s), errors.is_some()),
-            speed: self.vehicle.read(seen, &vehicle_times, errors.is_some()),
-            drag: self.drag.read(&seen.drag, seen, &analogue_times),
-            load: self.load.read(&seen.load, seen, &analogue_times),
-            brake: self.brake.read(&seen.brake, seen, &analogue_times),
+            wheel: seen.wheel_late.apply(seen.start, &wheel_times, |times| {
+                self.wheel.read(seen, times, erring)
+            }),
+            speed: seen
+                .vehicle_late
+                .apply(seen.start, &vehicle_times, |times| {
+                    self.vehicle.read(seen, times, erring)
+                }),
+            drag: self.drag.read(&seen.drag, seen, times),
+            load: self.load.read(&seen.load, seen, times),
+            brake: self.brake.read(&seen.brake, seen, &at(self.brake_late_s)),
         };
         for value in &mut channels.drag {
             *value = *value * (1.0 + spread.gain) + spread.zero_n;
@@ -253,6 +305,7 @@ impl Instruments {
                 .zip(times.first())
                 .map_or(1e-3, |(b, a)| (b - a).max(1e-6));
             if let Some(common) = self.common {
+                // A time base, or the frame's pitching: it changes when the reading does.
                 let series = colour::ornstein_uhlenbeck(
                     times.len(),
                     period,
@@ -260,19 +313,21 @@ impl Instruments {
                     common.relative,
                     draw,
                 );
-                for ((wheel, speed), error) in channels
-                    .wheel
-                    .iter_mut()
-                    .zip(&mut channels.speed)
-                    .zip(series)
-                {
-                    *wheel *= 1.0 + error;
-                    *speed *= 1.0 + error;
+                let on_wheel = self.wheel.hold(seen, &wheel_times, &series);
+                let on_speed = self.vehicle.hold(seen, &vehicle_times, &series);
+                for (value, error) in channels.wheel.iter_mut().zip(on_wheel) {
+                    *value *= 1.0 + error;
+                }
+                for (value, error) in channels.speed.iter_mut().zip(on_speed) {
+                    *value *= 1.0 + error;
                 }
             }
             self.wheel.add_noise(&mut channels.wheel, period, draw);
             let noise = self.vehicle_noise.series(times.len(), period, draw);
-            self.vehicle.add_noise(&mut channels.speed, times, &noise);
+            let noise = self.vehicle.hold(seen, &vehicle_times, &noise);
+            for (value, error) in channels.speed.iter_mut().zip(noise) {
+                *value += error;
+            }
             self.drag
                 .add_errors(&mut channels.drag, times, period, draw);
             self.load
@@ -283,31 +338,38 @@ impl Instruments {
         channels
     }
 
+    /// How long before a stretch's end the recorder must stop, s, so that a logger that is early still reads what was.
+    pub fn ahead_s(&self) -> f64 {
+        [self.wheel_late_s, self.vehicle_late_s, self.brake_late_s]
+            .into_iter()
+            .fold(0.0, |ahead: f64, late| ahead.max(-late))
+            + if self.clock < 0.0 { 0.01 } else { 0.0 }
+    }
+
     /// Mean delays of wheel speed, vehicle speed, drag, load and brake, s, the wheel's at an angular speed.
     pub fn delays(&self, wheel_rad_s: f64) -> [f64; 5] {
         [
             self.wheel.delay(wheel_rad_s) + self.wheel_late_s,
             self.vehicle.delay() + self.vehicle_late_s,
-            self.drag.delay() + self.analogue_late_s,
-            self.load.delay() + self.analogue_late_s,
-            self.brake.delay() + self.analogue_late_s,
+            self.drag.delay(),
+            self.load.delay(),
+            self.brake.delay() + self.brake_late_s,
         ]
     }
 
     /// Names of the vocabulary that the chain itself makes true: neither asked for nor false.
     pub fn tolerated(&self, rig: &Rig) -> Vec<String> {
-        let [wheel, vehicle, drag, load, _] = self.delays(0.8 * rig.mean_speed_m_s / rig.radius_m);
+        let [wheel, vehicle, drag, load, brake] =
+            self.delays(0.8 * rig.mean_speed_m_s / rig.radius_m);
         let mut names = Vec::new();
         let mut name = |condition: bool, id: &str| {
             if condition {
                 names.push(id.to_owned());
             }
         };
-        name(
-            (vehicle - drag).abs() > KNOWN_DELAY_S,
-            "vehicle_speed_delay",
-        );
-        name((wheel - drag).abs() > KNOWN_DELAY_S, "wheel_speed_delay");
+        name(vehicle - drag > KNOWN_DELAY_S, "vehicle_speed_delay");
+        name(wheel - drag > KNOWN_DELAY_S, "wheel_speed_delay");
+        name(drag - brake > KNOWN_DELAY_S, "brake_lag");
         // The load cell's own channel is the late one: against the other channels of its kind, or against both speeds.
         let late = drag - load > KNOWN_DELAY_S || drag - wheel.max(vehicle) > KNOWN_DELAY_S;
         name(late, "force_delay");

@@ -193,8 +193,6 @@ fn loggers_out_of_step_read_earlier_signals() {
 
 #[test]
 fn a_chain_without_errors_is_deterministic_and_with_them_has_the_size_it_says() {
-    let mut draw = Draw::new(5, &[1]);
-    let rig = Rig::draw(Needs::default(), &mut draw);
     let seen = seen();
     let mut chain = Instruments::ideal(ChainKind::Real);
     chain.drag.noise = Colour {
@@ -217,11 +215,69 @@ fn a_chain_without_errors_is_deterministic_and_with_them_has_the_size_it_says() 
             / read.drag.len() as f64;
     }
     assert!(((sum / 40.0).sqrt() / 30.0 - 1.0).abs() < 0.05);
-    // Every part comes up, and each rig has the sensors of its kind.
-    for seed in 0..200 {
+    let again = chain.read(&seen, &times(), RunSpread::default(), None);
+    assert_eq!(clean.drag, again.drag);
+}
+
+#[test]
+fn a_chain_reads_what_was_as_late_as_it_says_to_the_very_end_of_a_run() {
+    let seen = seen();
+    for seed in 0..150 {
         let mut draw = Draw::new(seed, &[3]);
+        let rig = Rig::draw(Needs::default(), &mut draw);
         let chain = Instruments::draw(ChainKind::Real, &rig, &mut draw);
-        assert!(chain.delays(60.0).iter().all(|delay| delay.abs() < 0.25));
+        let end = 3.0 - chain.ahead_s();
+        let times: Vec<f64> = (500..)
+            .map(|k| 1e-3 * f64::from(k))
+            .take_while(|time| *time <= end)
+            .collect();
+        let read = chain.read(&seen, &times, RunSpread::default(), None);
+        for (index, time) in times.iter().enumerate() {
+            let truth = |at: f64| (80.0 - 40.0 * at / 3.0, 25.0 - 10.0 * at / 3.0);
+            let delays = chain.delays(truth(*time).0);
+            let (wheel, vehicle) = (truth(time - delays[0]).0, truth(time - delays[1]).1);
+            // Holds and windows are off by half of themselves at their edges.
+            assert!(
+                (read.wheel[index] / wheel - 1.0).abs() < 0.03
+                    && (read.speed[index] / vehicle - 1.0).abs() < 0.03,
+                "seed {seed} at {time} s: {} for {wheel}, {} for {vehicle}: {chain:?}",
+                read.wheel[index],
+                read.speed[index]
+            );
+        }
+    }
+}
+
+#[test]
+fn a_concealed_delay_is_the_same_behind_every_sensor() {
+    let mut late = seen();
+    late.vehicle_late.pure_s = 0.05;
+    late.wheel_late.window_s = 0.04;
+    let plain = seen();
+    for seed in 0..60 {
+        let mut draw = Draw::new(seed, &[6]);
+        let rig = Rig::draw(Needs::default(), &mut draw);
+        let chain = Instruments::draw(ChainKind::Real, &rig, &mut draw);
+        let (with, without) = (
+            chain.read(&late, &times(), RunSpread::default(), None),
+            chain.read(&plain, &times(), RunSpread::default(), None),
+        );
+        // Straight lines: the same reading, so much higher, on the mean over holds.
+        let mean = |a: &[f64], b: &[f64]| {
+            a.iter().zip(b).map(|(a, b)| a - b).sum::<f64>() / a.len() as f64
+        };
+        let (vehicle, wheel) = (
+            mean(&with.speed, &without.speed),
+            mean(&with.wheel, &without.wheel),
+        );
+        assert!(
+            (vehicle / (0.05 * 10.0 / 3.0) - 1.0).abs() < 0.05,
+            "{vehicle}: {chain:?}"
+        );
+        assert!(
+            (wheel / (0.02 * 40.0 / 3.0) - 1.0).abs() < 0.1,
+            "{wheel}: {chain:?}"
+        );
     }
 }
 

@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::Seen;
 use super::colour::Colour;
-use super::wheel::windowed;
+use super::wheel::{resampled, window_end, windowed};
 use crate::draw::Draw;
 use crate::generate::chain::{at, low_pass};
 use crate::generate::rig::{Rig, RigKind};
@@ -50,7 +50,7 @@ impl VehicleSensor {
         match choice {
             "drum" => VehicleSensor::DrumEncoder {
                 step_m: std::f64::consts::TAU * draw.between(0.5, 1.7)
-                    / draw.one_of(&[1024.0, 2500.0, 5000.0]),
+                    / draw.one_of(&[5000.0, 10000.0, 20000.0]),
                 window_s: (2.0 / rig.rate_hz).max(draw.log_between(0.005, 0.02)),
             },
             "optical" => VehicleSensor::Optical {
@@ -103,7 +103,8 @@ impl VehicleSensor {
                 time_constant_s: draw.log_between(0.02, 0.3),
                 flicker: if draw.chance(0.5) { 0.2 } else { 0.0 },
             },
-            _ => Colour::white(0.2 * std),
+            // What these err by is their steps.
+            _ => Colour::default(),
         }
     }
 
@@ -178,15 +179,19 @@ impl VehicleSensor {
             .collect()
     }
 
-    /// Adds the noise that belongs to the speed itself, so that it is held or joined as the speed is.
-    pub fn add_noise(&self, values: &mut [f64], times: &[f64], noise: &[f64]) {
+    /// Values of the recorder's times as the sensor passes them on: held or joined as its readings are.
+    pub fn hold(&self, seen: &Seen, times: &[f64], series: &[f64]) -> Vec<f64> {
         let (Some(first), Some(last)) = (times.first(), times.last()) else {
-            return;
+            return Vec::new();
         };
         let per_s = (times.len().max(2) - 1) as f64 / (last - first).max(1e-9);
-        let errors = self.fixes(times, |fix| at(noise, (fix - first) * per_s));
-        for (value, error) in values.iter_mut().zip(errors) {
-            *value += error;
+        match self {
+            VehicleSensor::FifthWheel {
+                window_s,
+                held: true,
+                ..
+            } => resampled(times, series, |time| window_end(seen, time, *window_s)),
+            _ => self.fixes(times, |fix| at(series, (fix - first) * per_s)),
         }
     }
 

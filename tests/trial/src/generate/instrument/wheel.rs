@@ -193,6 +193,18 @@ impl WheelSensor {
         }
     }
 
+    /// Values of the recorder's times as the sensor passes them on: renewed only when its reading is.
+    pub fn hold(&self, seen: &Seen, times: &[f64], series: &[f64]) -> Vec<f64> {
+        match self {
+            WheelSensor::Counts {
+                window_s,
+                held: true,
+                ..
+            } => resampled(times, series, |time| window_end(seen, time, *window_s)),
+            _ => series.to_vec(),
+        }
+    }
+
     /// Random noise behind the sensor.
     pub fn add_noise(&self, values: &mut [f64], period: f64, draw: &mut Draw) {
         if let WheelSensor::Tacho { noise, .. } = self {
@@ -289,6 +301,23 @@ fn within(angle: f64, from: f64, to: f64, whole: f64) -> f64 {
     }
 }
 
+/// When the window that a held reading is of ended.
+pub fn window_end(seen: &Seen, time: f64, window_s: f64) -> f64 {
+    seen.start + ((time - seen.start) / window_s).floor() * window_s
+}
+
+/// A series at equal times, taken at other ones.
+pub fn resampled(times: &[f64], series: &[f64], when: impl Fn(f64) -> f64) -> Vec<f64> {
+    let (Some(first), Some(last)) = (times.first(), times.last()) else {
+        return Vec::new();
+    };
+    let per_s = (times.len().max(2) - 1) as f64 / (last - first).max(1e-9);
+    times
+        .iter()
+        .map(|time| at(series, (when(*time) - first) * per_s))
+        .collect()
+}
+
 /// Speed from whole steps of a position passed in a window; without `errors` from the position itself.
 pub fn windowed(
     position: &[f64],
@@ -310,7 +339,7 @@ pub fn windowed(
         .iter()
         .map(|&time| {
             let end = if held {
-                start + ((time - start) / window_s).floor() * window_s
+                window_end(seen, time, window_s)
             } else {
                 time
             };
