@@ -17,7 +17,12 @@ use crate::contract::{list, number, text};
 pub(super) enum Expect {
     /// One of these verdicts.
     Verdict(&'static [&'static str]),
+    /// Undecided or unexplained; where the delay of a speed is named, explained or partly explained, as the contract
+    /// then has it.
+    Unsolved,
     NothingNamed,
+    /// Nothing named but the delay of a speed, which the contract asks for where the residuals show it.
+    NoPhysics,
     /// Nothing of the tyre balance is named but these.
     TyreOnly(&'static [&'static str]),
     /// This balance is flagged.
@@ -60,9 +65,14 @@ pub(super) struct Set {
 }
 
 use Expect::{
-    Absent, Figure, First, Flagged, Leaks, MayLeak, NothingNamed, Radius, SpeedLate,
-    SpeedsDisagree, SureHelps, TooSlow, TyreOnly, Unknown, Useless, Verdict,
+    Absent, Figure, First, Flagged, Leaks, MayLeak, NoPhysics, NothingNamed, Radius, SpeedLate,
+    SpeedsDisagree, SureHelps, TooSlow, TyreOnly, Unknown, Unsolved, Useless, Verdict,
 };
+
+const VEHICLE: &str = "vehicle_speed_m_s";
+const WHEEL: &str = "wheel_speed_rad_s";
+/// Names that say of a speed channel only that it is late.
+const SPEED_DELAYS: [&str; 2] = ["vehicle_speed_delay", "wheel_speed_delay"];
 
 /// The car's mass times 1.1 and 1.3 m/s².
 const COAST: (f64, f64) = (1.1 * 1.67, 1.3 * 1.67);
@@ -140,8 +150,8 @@ pub(super) const SETS: [Set; 7] = [
         folder: "f110-slides",
         files: &["DS1", "DS2", "DS3", "DS4", "DS5"],
         expects: &[
-            Verdict(&["undecided", "unexplained"]),
-            NothingNamed,
+            Unsolved,
+            NoPhysics,
             Useless("drag_force_n"),
             SpeedLate(0.04, 0.08),
             SpeedsDisagree("DS4"),
@@ -261,23 +271,62 @@ fn speed_late(diagnosis: &Value) -> Option<f64> {
             .collect();
         (!found.is_empty()).then(|| found.iter().sum::<f64>() / found.len() as f64)
     };
-    match (mean("vehicle_speed_m_s"), mean("wheel_speed_rad_s")) {
+    match (mean(VEHICLE), mean(WHEEL)) {
         (None, None) => None,
         (vehicle, wheel) => Some(vehicle.unwrap_or(0.0) - wheel.unwrap_or(0.0)),
     }
 }
 
-/// The radius that was found: as a mechanism, or as a scale of a speed in the chain. Which speed the scale is of is
-/// the tool's choice, so that either way round will do.
+/// The radius that was found: as a mechanism, or as a scale of one speed against the other in the chain.
+///
+/// A scale is reading over truth, as the contract has it of `force_gain`. Which speed it is of is the tool's choice,
+/// and that decides which way it goes. Both true, the speeds obey `v = R·omega`. With the nominal radius taken for
+/// true, a vehicle speed that reads `s` times too much has `v = s·nominal·omega`, so `R = nominal·s`; a wheel speed that
+/// does has `omega = s·v/nominal`, so `R = nominal/s`. A scale against a third channel says nothing of the radius.
 fn radius(diagnosis: &Value, nominal: f64) -> Option<f64> {
     if let Some((radius, _)) = figure(diagnosis, "effective_radius", "radius") {
         return Some(radius);
     }
     list(diagnosis, "chain")
         .iter()
-        .find(|f| text(f, "finding") == "scale" && text(f, "channel").contains("speed"))
-        .map(|f| number(f, "value"))
-        .map(|scale| nominal * scale.max(1.0 / scale))
+        .filter(|f| text(f, "finding") == "scale")
+        .find_map(|f| {
+            let scale = number(f, "value");
+            match (text(f, "channel"), text(f, "relative_to")) {
+                (VEHICLE, "" | WHEEL) => Some(nominal * scale),
+                (WHEEL, "" | VEHICLE) => Some(nominal / scale),
+                _ => None,
+            }
+        })
+}
+
+/// Whether a fault says that the speed is too low to be used: one of a speed channel, or of a run as a whole (no
+/// channel, or its time), which then has to say that it is the speed.
+fn too_slow(fault: &Value) -> bool {
+    let what = text(fault, "what").to_lowercase();
+    let has = |words: &[&str]| words.iter().any(|word| what.contains(word));
+    let of_speed = match text(fault, "channel") {
+        VEHICLE | WHEEL => true,
+        "" | "*" | "time_s" => has(&["speed", "m/s", "standstill"]),
+        _ => false,
+    };
+    let low = has(&[
+        "slow",
+        "below",
+        "too low",
+        "minimum",
+        "standstill",
+        "0.5 m/s",
+    ]);
+    // A channel can be noisy or sampled below some bound as well.
+    of_speed && low && !has(&["noise", "sampl"])
+}
+
+/// Whether all that is named is the delay of a speed.
+fn only_speed_delays(mechanisms: &[Value]) -> bool {
+    mechanisms
+        .iter()
+        .all(|m| SPEED_DELAYS.contains(&text(m, "id")))
 }
 
 impl Expect {
@@ -285,7 +334,11 @@ impl Expect {
     pub(super) fn must(self) -> String {
         match self {
             Verdict(words) => format!("verdict {}", words.join(" or ")),
+            Unsolved => "verdict undecided or unexplained; beside a named delay of a speed also explained or \
+                         partly_explained"
+                .to_owned(),
             NothingNamed => "nothing named".to_owned(),
+            NoPhysics => "no physics named (the delay of a speed is none)".to_owned(),
             TyreOnly(ids) => format!("nothing of the tyre named but {}", quoted(ids)),
             Flagged(balance) => format!("the {balance} balance flagged"),
             First(id) => format!("`{id}` first"),
@@ -335,7 +388,17 @@ impl Expect {
                 let verdict = text(diagnosis, "verdict");
                 (told(diagnosis), Some(words.contains(&verdict)))
             }
+            Unsolved => {
+                let allowed: &[&str] = if mechanisms.is_empty() {
+                    &["undecided", "unexplained"]
+                } else {
+                    &["explained", "partly_explained"]
+                };
+                let good = allowed.contains(&text(diagnosis, "verdict"));
+                (told(diagnosis), Some(good && only_speed_delays(mechanisms)))
+            }
             NothingNamed => (ids(), Some(mechanisms.is_empty())),
+            NoPhysics => (ids(), Some(only_speed_delays(mechanisms))),
             TyreOnly(allowed) => {
                 let others = mechanisms
                     .iter()
@@ -423,14 +486,10 @@ impl Expect {
             TooSlow => {
                 let said = list(diagnosis, "data_faults")
                     .iter()
-                    .map(|fault| text(fault, "what"))
-                    .find(|what| {
-                        ["speed", "slow", "m/s", "standstill"]
-                            .iter()
-                            .any(|word| what.contains(word))
-                    });
+                    .find(|fault| too_slow(fault))
+                    .map(|fault| text(fault, "what"));
                 (
-                    said.unwrap_or("nothing said of the speed").to_owned(),
+                    said.unwrap_or("nothing said of too low a speed").to_owned(),
                     Some(said.is_some()),
                 )
             }
@@ -498,7 +557,7 @@ mod tests {
     use serde_json::json;
 
     #[test]
-    fn a_delay_is_a_difference_of_two_and_a_radius_goes_either_way() {
+    fn a_delay_is_a_difference_of_two_channels() {
         let late = |entries: &[(&str, f64)]| {
             let chain: Vec<Value> = entries
                 .iter()
@@ -506,13 +565,94 @@ mod tests {
                 .collect();
             speed_late(&json!({ "chain": chain }))
         };
-        let (vehicle, wheel) = ("vehicle_speed_m_s", "wheel_speed_rad_s");
-        assert!((late(&[(vehicle, 0.11), (wheel, 0.03)]).unwrap() - 0.08).abs() < 1e-12);
-        assert_eq!(late(&[(wheel, -0.08)]), Some(0.08));
+        assert!((late(&[(VEHICLE, 0.11), (WHEEL, 0.03)]).unwrap() - 0.08).abs() < 1e-12);
+        assert_eq!(late(&[(WHEEL, -0.08)]), Some(0.08));
         assert_eq!(late(&[]), None);
-        for scale in [353.0 / 350.0, 350.0 / 353.0] {
-            let said = json!({"chain": [{"finding": "scale", "channel": vehicle, "value": scale}]});
-            assert!((radius(&said, 0.35).unwrap() - 0.353).abs() < 1e-9);
+    }
+
+    #[test]
+    fn the_channel_decides_which_way_a_scale_goes() {
+        let found = |channel: &str, relative_to: &str, scale: f64| {
+            let finding = json!({"finding": "scale", "channel": channel, "value": scale,
+                                 "relative_to": relative_to});
+            radius(&json!({ "chain": [finding] }), 0.35)
+        };
+        let near =
+            |found: Option<f64>, radius: f64| found.is_some_and(|r| (r - radius).abs() < 1e-9);
+        let large = 353.0 / 350.0;
+        assert!(near(found(VEHICLE, WHEEL, large), 0.353));
+        assert!(near(found(WHEEL, "", 1.0 / large), 0.353));
+        // The wrong way round is the wrong radius.
+        assert!(!near(found(WHEEL, VEHICLE, large), 0.353));
+        assert!(!near(found(VEHICLE, "", 1.0 / large), 0.353));
+        // A scale against something else, or of something else, is none of the radius.
+        assert_eq!(found(VEHICLE, "gnss_ublox_speed_m_s", large), None);
+        assert_eq!(found("gnss_ublox_speed_m_s", WHEEL, large), None);
+        // Reading over truth, played through: a wheel of 0.353 m at 10 m/s, read as if it had 0.35 m.
+        let (v, omega) = (10.0, 10.0 / 0.353);
+        assert!(near(found(VEHICLE, WHEEL, v / (0.35 * omega)), 0.353));
+        assert!(near(found(WHEEL, VEHICLE, omega / (v / 0.35)), 0.353));
+    }
+
+    #[test]
+    fn a_speed_that_is_too_low_has_to_be_told_as_that() {
+        let said = |channel: &str, what: &str| too_slow(&json!({"channel": channel, "what": what}));
+        assert!(said(VEHICLE, "below the smallest usable speed of 0.5 m/s"));
+        assert!(said(VEHICLE, "Too slow throughout"));
+        assert!(said(WHEEL, "the wheel is at standstill"));
+        assert!(said("", "no speed above the minimum"));
+        assert!(said("time_s", "speed under 0.5 m/s in the whole run"));
+        for (channel, what) in [
+            (VEHICLE, "the speed channel is frozen"),
+            (VEHICLE, "speed: 49 values missing"),
+            (VEHICLE, "noise below the declared"),
+            (WHEEL, "sampled too slowly"),
+            ("time_s", "gap of 0.500 s"),
+            ("time_s", "fewer rows than the minimum"),
+            ("normal_force_n", "speed below 0.5 m/s"),
+        ] {
+            assert!(!said(channel, what), "{channel}: {what}");
+        }
+    }
+
+    #[test]
+    fn the_delay_of_a_speed_is_no_physics() {
+        let loaded = bare(SETS[5]);
+        let judged = |expect: Expect, verdict: &str, ids: &[&str]| {
+            let named: Vec<Value> = ids.iter().map(|id| json!({ "id": id })).collect();
+            let said = json!({"verdict": verdict, "mechanisms": named});
+            expect.judge(&loaded, &said, &[]).1.unwrap()
+        };
+        for ids in [
+            &[][..],
+            &["vehicle_speed_delay"],
+            &["wheel_speed_delay", "vehicle_speed_delay"],
+        ] {
+            assert!(judged(NoPhysics, "", ids));
+            // The verdict has to go with the names.
+            for verdict in ["undecided", "unexplained"] {
+                assert_eq!(judged(Unsolved, verdict, ids), ids.is_empty());
+            }
+            for verdict in ["explained", "partly_explained"] {
+                assert_eq!(judged(Unsolved, verdict, ids), !ids.is_empty());
+            }
+            assert!(!judged(Unsolved, "consistent", ids));
+        }
+        for ids in [&["force_delay"][..], &["vehicle_speed_delay", "run_out"]] {
+            assert!(!judged(NoPhysics, "", ids));
+            assert!(!judged(Unsolved, "explained", ids));
+        }
+        assert!(!judged(NothingNamed, "", &["vehicle_speed_delay"]));
+    }
+
+    /// A set without recordings.
+    fn bare(set: Set) -> Loaded {
+        Loaded {
+            set,
+            rig: PathBuf::new(),
+            rig_text: "[wheel]\nradius_m = 0.3 # m\n".to_owned(),
+            paths: vec![],
+            runs: vec![],
         }
     }
 
@@ -539,13 +679,7 @@ mod tests {
 
     #[test]
     fn a_tool_without_an_answer_meets_nothing() {
-        let loaded = Loaded {
-            set: SETS[6],
-            rig: PathBuf::new(),
-            rig_text: "[wheel]\nradius_m = 0.3 # m\n".to_owned(),
-            paths: vec![],
-            runs: vec![],
-        };
+        let loaded = bare(SETS[6]);
         assert!((loaded.rig_number("radius_m") - 0.3).abs() < 1e-12);
         let failed = json!({"verdict": "(exit status: 2)"});
         assert_eq!(NothingNamed.judge(&loaded, &failed, &[]).1, Some(false));
