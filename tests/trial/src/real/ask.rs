@@ -25,8 +25,6 @@ pub(super) struct Ask<'a> {
 pub(super) struct Answer {
     pub(super) value: Value,
     pub(super) folder: PathBuf,
-    /// Text of `model.toml`.
-    pub(super) model: String,
 }
 
 impl Ask<'_> {
@@ -36,7 +34,6 @@ impl Ask<'_> {
         let failed = |why: String, folder: &Path| Answer {
             value: json!({ "verdict": format!("({why})") }),
             folder: folder.to_owned(),
-            model: String::new(),
         };
         if !folder.join("done").exists() {
             let mut command = Command::new(&self.tool.path);
@@ -57,12 +54,7 @@ impl Ask<'_> {
         if let Some(complaint) = complaints(&value).into_iter().next() {
             return Ok(failed(complaint, &folder));
         }
-        let model = fs::read_to_string(folder.join("model.toml")).unwrap_or_default();
-        Ok(Answer {
-            value,
-            folder,
-            model,
-        })
+        Ok(Answer { value, folder })
     }
 
     /// Drag of a run as a diagnosis' model predicts it, repaired or not; none where the tool fails.

@@ -302,10 +302,7 @@ fn judged(set: &Found, placebo: Placebo, answer: Option<&Answer>) -> Tried {
         placebo,
         senseless: None,
         told: told(&answer.value),
-        fates: placebo.fates(
-            (&set.whole.value, &set.whole.model),
-            (&answer.value, &answer.model),
-        ),
+        fates: placebo.fates(&set.loaded.runs, &set.whole.value, &answer.value),
         used: placebo.used(&answer.value),
         copy_told: placebo::leaks(&answer.value, COPY),
     }
@@ -391,7 +388,7 @@ fn headlines(found: &[Found]) -> Vec<Headline> {
         ),
         share(
             "column_used",
-            "sets explained by a column that explains nothing, random or a copy of the drag",
+            "placebos explained by their own column that explains nothing, random or a copy of the drag",
             Better::Lower,
             0.0,
             Share::count(tried().filter(|t| !t.placebo.columns().is_empty()), |t| {
@@ -532,7 +529,11 @@ mod tests {
             serde_json::json!({"verdict": "undecided", "mechanisms": []}),
             vec![
                 tried(Placebo::Reversed, &fates, &[]),
-                tried(Placebo::RandomColumns, &[], &["regions: random_walk"]),
+                tried(
+                    Placebo::RandomColumns(placebo::Draws::First),
+                    &[],
+                    &["regions: random_walk"],
+                ),
                 tried(Placebo::CopiedDrag, &[], &[]),
                 skipped,
             ],

@@ -242,6 +242,11 @@ pub(super) fn page(
     for row in SOURCES {
         sources.row(row.map(str::to_owned));
     }
+    sources.note = Some(
+        "The hard stops of a road car and the coast-down of a drum, of earlier measurements, are not among the recordings in reach, \
+         so they are not here."
+            .to_owned(),
+    );
     text.push_str(&sources.markdown());
     text.push_str(&figures(headlines).markdown());
     text.push_str("![Sets and placebos](reality/placebos.svg)\n\n");
@@ -275,7 +280,12 @@ pub(super) fn page(
         "A name of the destroyed kind that is given with the original and again with the placebo **survives**: a failure. One that is \
          given with the placebo alone **arises**, and is counted apart. The swapped drag is taken half a run off because the circles all \
          rise alike: the drag of the next run at the same place correlates with the own one by 0.91 to 0.99, and destroys nothing. \
-         The copy may be named in `chain` (`leaks`), and there it must be."
+         The copy may be named in `chain` (`leaks`), and there it must be. \
+         `slip_hysteresis` is not judged in reversed time: a loop run through backwards is a loop still, with other curves for rising and \
+         falling slip, and `loop_share`, half its height over friction, has no sense that would have to turn. A delay must turn: what came \
+         late comes early. `zero_drift` is not judged in another order: a zero that drifts in each run anew does so in any order, one that \
+         drifts through all runs does not, and no field of the contract tells the two apart. A mass is the ratio of drag to deceleration, \
+         and so is a wheel's inertia unless a brake torque moves, which would give it without the drag."
             .to_owned(),
     );
     text.push_str(&kinds.markdown());

@@ -568,6 +568,7 @@ fn matrix(found: &[Found]) -> Result<String> {
             // Long names take two lines.
             let lines: Vec<&str> = match placebo.name() {
                 "runs in another order" => vec!["runs in", "another order"],
+                "other random columns" => vec!["other random", "columns"],
                 name => vec![name],
             };
             for (k, line) in lines.iter().enumerate() {

@@ -26,31 +26,42 @@ pub(super) enum Placebo {
     Reversed,
     Reordered,
     DragSwapped,
-    RandomColumns,
+    /// Of two draws: one may fit by chance, or fail to.
+    RandomColumns(Draws),
     CopiedDrag,
 }
 
-pub(super) const ALL: [Placebo; 5] = [
+/// Which draw of the random columns.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Draws {
+    First,
+    Second,
+}
+
+pub(super) const ALL: [Placebo; 6] = [
     Placebo::Reversed,
     Placebo::Reordered,
     Placebo::DragSwapped,
-    Placebo::RandomColumns,
+    Placebo::RandomColumns(Draws::First),
+    Placebo::RandomColumns(Draws::Second),
     Placebo::CopiedDrag,
 ];
 
 /// Names that claim that something follows later than its cause, or depends on what went before.
-const AFTERWARDS: [&str; 8] = [
-    "force_delay",
+///
+/// `slip_hysteresis` is none of them. What it claims is that rising and falling slip follow different curves, whatever
+/// the rate: a loop run through backwards is a loop still, of the same height. Only its sense turns, and of that its
+/// figure says nothing: `loop_share`, half the loop's height over friction, is a size.
+const AFTERWARDS: [&str; 6] = [
     "force_lag",
     "relaxation_length",
     "structural_resonance",
     "thermal_fade",
     "brake_lag",
     "brake_fade",
-    "slip_hysteresis",
 ];
-/// Names whose sign must turn where time does.
-const TURNS: [&str; 2] = ["vehicle_speed_delay", "wheel_speed_delay"];
+/// Names whose sign must turn where time does: what came late comes early.
+const TURNS: [&str; 3] = ["force_delay", "vehicle_speed_delay", "wheel_speed_delay"];
 /// Names of the tyre balance that two speeds alone can show, without the drag.
 pub(super) const OF_SPEEDS: [&str; 4] = [
     "effective_radius",
@@ -76,7 +87,8 @@ impl Placebo {
             Placebo::Reversed => "time reversed",
             Placebo::Reordered => "runs in another order",
             Placebo::DragSwapped => "drag swapped",
-            Placebo::RandomColumns => "random columns",
+            Placebo::RandomColumns(Draws::First) => "random columns",
+            Placebo::RandomColumns(Draws::Second) => "other random columns",
             Placebo::CopiedDrag => "copied drag",
         }
     }
@@ -98,9 +110,10 @@ impl Placebo {
             Placebo::DragSwapped => {
                 "each run has the next run's drag, second half first, stretched to its length; a single run has its own"
             }
-            Placebo::RandomColumns => {
+            Placebo::RandomColumns(Draws::First) => {
                 "three more columns: white noise, noise that is correlated over 1 s, a random walk"
             }
+            Placebo::RandomColumns(Draws::Second) => "three such columns of another draw",
             Placebo::CopiedDrag => {
                 "one more column: 1.02 times the drag, two samples late, with noise of 1 % of the drag's scatter"
             }
@@ -110,13 +123,15 @@ impl Placebo {
     pub(super) fn destroys_what(self) -> &'static str {
         match self {
             Placebo::Reversed => {
-                "delay, lag, relaxation, resonance, fade, hysteresis; the delay of a speed where its sign stays"
+                "lag, relaxation, resonance, fade; the delay of the force or of a speed where its sign stays; \
+                 `slip_hysteresis` is not judged"
             }
-            Placebo::Reordered => "`wear_drift`; `zero_drift` where it runs through the runs",
+            Placebo::Reordered => "`wear_drift`; `zero_drift` is not judged",
             Placebo::DragSwapped => {
-                "every name of the tyre balance but those that the speeds alone can show; `force_gain`"
+                "every name of the tyre balance but those that the speeds alone can show; `force_gain`, `vehicle_inertia`, and \
+                 `wheel_inertia` where no brake torque moves"
             }
-            Placebo::RandomColumns | Placebo::CopiedDrag => {
+            Placebo::RandomColumns(_) | Placebo::CopiedDrag => {
                 "nothing; the column explains nothing, and none may be named"
             }
         }
@@ -137,31 +152,36 @@ impl Placebo {
         }
     }
 
-    /// Whether a mechanism claims what this placebo destroys; `model` is the text of `model.toml`, which alone says
-    /// over what clock a zero drifts.
-    pub(super) fn destroys(self, mechanism: &Value, model: &str) -> bool {
+    /// Whether a mechanism claims what this placebo destroys in these runs.
+    fn destroys(self, mechanism: &Value, runs: &[Recording]) -> bool {
         let id = text(mechanism, "id");
         match self {
             Placebo::Reversed => AFTERWARDS.contains(&id) || TURNS.contains(&id),
-            Placebo::Reordered => id == "wear_drift" || (id == "zero_drift" && through_runs(model)),
+            // A zero that drifts in each run anew does so in any order, one that drifts through all of them does not;
+            // no field of the contract tells the two apart, so `zero_drift` is not judged.
+            Placebo::Reordered => id == "wear_drift",
+            // A mass is the ratio of drag to deceleration; so is the wheel's inertia where no brake moves, whose torque
+            // over the wheel's deceleration would give it without the drag.
             Placebo::DragSwapped => {
-                id == "force_gain"
+                ["force_gain", "vehicle_inertia"].contains(&id)
+                    || (id == "wheel_inertia" && !runs.iter().any(Recording::has_brake))
                     || (text(mechanism, "balance") == "tyre" && !OF_SPEEDS.contains(&id))
             }
-            Placebo::RandomColumns | Placebo::CopiedDrag => false,
+            Placebo::RandomColumns(_) | Placebo::CopiedDrag => false,
         }
     }
 
-    /// What became of the names that it destroys: with the original's diagnosis and model, and its own.
+    /// What became of the names that it destroys: with the runs as recorded, their diagnosis, and its own.
     pub(super) fn fates(
         self,
-        original: (&Value, &str),
-        changed: (&Value, &str),
+        runs: &[Recording],
+        original: &Value,
+        changed: &Value,
     ) -> Vec<(String, Fate)> {
-        let of = |(diagnosis, model): (&Value, &str)| -> Vec<Value> {
+        let of = |diagnosis: &Value| -> Vec<Value> {
             list(diagnosis, "mechanisms")
                 .iter()
-                .filter(|m| self.destroys(m, model))
+                .filter(|m| self.destroys(m, runs))
                 .cloned()
                 .collect()
         };
@@ -202,7 +222,7 @@ impl Placebo {
     /// Columns that it adds.
     pub(super) fn columns(self) -> &'static [&'static str] {
         match self {
-            Placebo::RandomColumns => &RANDOM,
+            Placebo::RandomColumns(_) => &RANDOM,
             Placebo::CopiedDrag => &[COPY],
             _ => &[],
         }
@@ -229,7 +249,7 @@ impl Placebo {
                 }
             }
             // Noise leaks nothing.
-            if self == Placebo::RandomColumns && leaks(diagnosis, column) {
+            if matches!(self, Placebo::RandomColumns(_)) && leaks(diagnosis, column) {
                 found.push(format!("leaks: {column}"));
             }
         }
@@ -249,7 +269,7 @@ impl Placebo {
                     Placebo::Reversed => reversed(&runs[k]),
                     Placebo::Reordered => runs[k].clone(),
                     Placebo::DragSwapped => swapped(&runs[k], &runs[(k + 1) % runs.len()]),
-                    Placebo::RandomColumns => with_random(&runs[k], k),
+                    Placebo::RandomColumns(draws) => with_random(&runs[k], k, draws),
                     Placebo::CopiedDrag => with_copy(&runs[k], k),
                 };
                 (k, changed)
@@ -271,15 +291,6 @@ pub(super) fn leaks(diagnosis: &Value, column: &str) -> bool {
     list(diagnosis, "chain")
         .iter()
         .any(|f| text(f, "finding") == "leaks" && text(f, "channel") == column)
-}
-
-/// Whether the model's drift of the zero goes on from run to run.
-fn through_runs(model: &str) -> bool {
-    model
-        .split("id = \"zero_drift\"")
-        .skip(1)
-        .filter_map(|rest| rest.lines().take(4).find(|line| line.starts_with("form")))
-        .any(|form| form.contains("through"))
 }
 
 /// Correlation of an order with the rising one.
@@ -358,11 +369,11 @@ fn at(time: &[f64], values: &[f64], wanted: f64) -> f64 {
     }
 }
 
-fn with_random(run: &Recording, place: usize) -> Recording {
+fn with_random(run: &Recording, place: usize, draws: Draws) -> Recording {
     let mut out = run.clone();
     let time = &run.columns[TIME];
     for (kind, name) in RANDOM.iter().enumerate() {
-        let mut draw = Draw::new(SEED, &[2, place as u64, kind as u64]);
+        let mut draw = Draw::new(SEED + draws as u64, &[2, place as u64, kind as u64]);
         let mut value = if kind == 2 { 0.0 } else { draw.normal() };
         let column = (0..time.len())
             .map(|k| {
@@ -519,21 +530,27 @@ mod tests {
     #[test]
     fn random_columns_are_what_they_are_called_and_follow_nothing() {
         let before = run(0.0);
-        let after = Placebo::RandomColumns.apply(std::slice::from_ref(&before))[0]
-            .1
-            .clone();
-        assert_eq!(before.columns, after.columns);
-        assert_eq!(after.others.len(), 4);
-        let [white, slow, walk] = [1, 2, 3].map(|k| after.others[k].1.clone());
+        let drawn = |draws: Draws| {
+            let (_, after) = Placebo::RandomColumns(draws)
+                .apply(std::slice::from_ref(&before))
+                .remove(0);
+            after
+        };
         let neighbours = |x: &[f64]| correlation(&x[1..], &x[..x.len() - 1]);
-        assert!(neighbours(&white).abs() < 0.1);
-        assert!((0.95..0.995).contains(&neighbours(&slow)));
-        assert!(neighbours(&walk) > 0.99);
-        assert!(correlation(&white, &before.columns[3]).abs() < 0.1);
-        assert_eq!(
-            after,
-            Placebo::RandomColumns.apply(std::slice::from_ref(&before))[0].1
-        );
+        for draws in [Draws::First, Draws::Second] {
+            let after = drawn(draws);
+            assert_eq!(before.columns, after.columns);
+            assert_eq!(after.others.len(), 4);
+            let [white, slow, walk] = [1, 2, 3].map(|k| after.others[k].1.clone());
+            assert!(neighbours(&white).abs() < 0.1);
+            assert!((0.95..0.995).contains(&neighbours(&slow)));
+            assert!(neighbours(&walk) > 0.99);
+            assert!(correlation(&white, &before.columns[3]).abs() < 0.1);
+            assert_eq!(after, drawn(draws));
+        }
+        // The two draws have nothing to do with each other.
+        let (first, second) = (drawn(Draws::First), drawn(Draws::Second));
+        assert!(correlation(&first.others[1].1, &second.others[1].1).abs() < 0.1);
     }
 
     #[test]
@@ -559,35 +576,73 @@ mod tests {
 
     #[test]
     fn a_name_survives_arises_or_goes() {
-        let fates = |placebo: Placebo, a: &Value, b: &Value| placebo.fates((a, ""), (b, ""));
+        let fates = |placebo: Placebo, a: &Value, b: &Value| placebo.fates(&[], a, b);
         let (lag, none) = (named("force_lag", "tyre", 0.1), json!({"mechanisms": []}));
         let one = |fate| vec![("force_lag".to_owned(), fate)];
         assert_eq!(fates(Placebo::Reversed, &lag, &lag), one(Fate::Survives));
         assert_eq!(fates(Placebo::Reversed, &lag, &none), one(Fate::Gone));
         assert_eq!(fates(Placebo::DragSwapped, &none, &lag), one(Fate::Arises));
         assert_eq!(fates(Placebo::Reordered, &lag, &lag), []);
-        // A delay of a speed that turns with time was read off the recording.
-        let late = named("vehicle_speed_delay", "tyre", 0.08);
-        let early = named("vehicle_speed_delay", "tyre", -0.08);
-        assert_eq!(fates(Placebo::Reversed, &late, &early)[0].1, Fate::Gone);
-        assert_eq!(fates(Placebo::Reversed, &late, &late)[0].1, Fate::Survives);
-        assert_eq!(fates(Placebo::DragSwapped, &late, &late), []);
     }
 
     #[test]
-    fn a_drift_of_the_zero_is_of_the_order_only_where_it_runs_through_the_runs() {
-        let drift = named("zero_drift", "tyre", 0.0);
-        let model =
-            |form: &str| format!("[[tyre]]\nid = \"zero_drift\"\nform = \"{form}\"\nslope = 1\n");
-        let fates = |form: &str| {
-            Placebo::Reordered
-                .fates((&drift, &model(form)), (&drift, &model(form)))
-                .len()
+    fn a_delay_that_turns_with_time_was_read_off_the_recording() {
+        let fate = |placebo: Placebo, id: &str, before: f64, after: f64| {
+            let (before, after) = (named(id, "tyre", before), named(id, "tyre", after));
+            placebo.fates(&[], &before, &after)
         };
-        assert_eq!(
-            (fates("linear_in_run"), fates("linear_through_runs")),
-            (0, 1)
-        );
+        for id in TURNS {
+            assert_eq!(fate(Placebo::Reversed, id, 0.08, -0.08)[0].1, Fate::Gone);
+            assert_eq!(fate(Placebo::Reversed, id, 0.08, 0.08)[0].1, Fate::Survives);
+            assert_eq!(
+                fate(Placebo::Reversed, id, -0.02, -0.01)[0].1,
+                Fate::Survives
+            );
+        }
+        // The speeds show theirs without the drag.
+        let swapped = |id| fate(Placebo::DragSwapped, id, 0.08, 0.08).len();
+        assert_eq!(TURNS.map(swapped), [1, 0, 0]);
+    }
+
+    #[test]
+    fn a_loop_run_through_backwards_is_a_loop_still() {
+        let hysteresis = named("slip_hysteresis", "tyre", f64::NAN);
+        let fates = |placebo: Placebo| placebo.fates(&[], &hysteresis, &hysteresis);
+        assert_eq!(fates(Placebo::Reversed), []);
+        assert_eq!(fates(Placebo::DragSwapped)[0].1, Fate::Survives);
+    }
+
+    #[test]
+    fn a_swapped_drag_takes_the_inertia_that_rests_on_it() {
+        let survivors = |id: &str, balance: &str, runs: &[Recording]| {
+            let said = named(id, balance, f64::NAN);
+            Placebo::DragSwapped.fates(runs, &said, &said).len()
+        };
+        let mut braked = run(0.0);
+        let torque = (0..braked.len()).map(|k| (0.01 * k as f64).sin()).collect();
+        braked.others.push(("brake_torque_nm".to_owned(), torque));
+        let mut held = run(0.0);
+        held.others
+            .push(("brake_torque_nm".to_owned(), vec![0.0; held.len()]));
+        for runs in [[run(0.0)], [held], [braked.clone()]] {
+            assert_eq!(survivors("vehicle_inertia", "vehicle", &runs), 1);
+            assert_eq!(survivors("force_gain", "vehicle", &runs), 1);
+            assert_eq!(survivors("grade_or_drive", "vehicle", &runs), 0);
+            let moves = runs[0] == braked;
+            assert_eq!(
+                survivors("wheel_inertia", "wheel", &runs),
+                usize::from(!moves)
+            );
+        }
+    }
+
+    #[test]
+    fn another_order_takes_the_wear_and_leaves_the_drift_of_a_zero_alone() {
+        let survivors = |id: &str| {
+            let said = named(id, "tyre", f64::NAN);
+            Placebo::Reordered.fates(&[], &said, &said).len()
+        };
+        assert_eq!((survivors("wear_drift"), survivors("zero_drift")), (1, 0));
     }
 
     #[test]
@@ -598,7 +653,9 @@ mod tests {
             "regions": [{"variable": "copied_force_n"}],
             "chain": [{"finding": "leaks", "channel": "copied_force_n"}],
         });
-        assert_eq!(Placebo::RandomColumns.used(&diagnosis).len(), 2);
+        for draws in [Draws::First, Draws::Second] {
+            assert_eq!(Placebo::RandomColumns(draws).used(&diagnosis).len(), 2);
+        }
         assert_eq!(Placebo::CopiedDrag.used(&diagnosis).len(), 1);
         assert!(leaks(&diagnosis, COPY));
         assert!(Placebo::Reversed.used(&diagnosis).is_empty());

@@ -121,6 +121,18 @@ impl Recording {
         drag.iter().any(|f| f.is_finite() && *f != drag[0])
     }
 
+    /// Whether a brake torque or pressure moves.
+    pub(super) fn has_brake(&self) -> bool {
+        self.others
+            .iter()
+            .filter(|(name, _)| ["brake_torque_nm", "brake_pressure_pa"].contains(&name.as_str()))
+            .any(|(_, values)| {
+                let mut known = values.iter().filter(|x| x.is_finite());
+                let first = known.next();
+                known.any(|x| Some(x) != first)
+            })
+    }
+
     /// Stretches without a gap.
     pub(super) fn stretches(&self) -> Vec<std::ops::Range<usize>> {
         let time = &self.columns[TIME];
