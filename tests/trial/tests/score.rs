@@ -202,7 +202,7 @@ fn a_tool_that_knows_the_truth_gets_full_marks_and_a_blind_one_none() {
     assert!(
         report
             .text()
-            .contains("nothing missing, real chains: false physics")
+            .contains("nothing missing, real chains: false names")
     );
 }
 

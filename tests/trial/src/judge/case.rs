@@ -2,17 +2,17 @@
 
 use std::path::Path;
 
-use anyhow::{Context, Result};
+use anyhow::Result;
 use serde::Serialize;
 use serde_json::Value;
 
-use crate::baseline::record::read as read_run;
 use crate::contract::{breaches, list, number, text};
 use crate::generate::campaign::Truth;
-use crate::generate::files::read_column;
 use crate::generate::instrument::ChainKind;
-use crate::generate::instrument::finding::Finding;
-use crate::generate::measure::{Base, base_drag, refit};
+use crate::judge::findings::{false_findings, finding};
+use crate::judge::gain::{GainCase, gains};
+use crate::judge::names::{self, Standing, standing};
+use crate::judge::timing::{self, LateCase, Timing};
 use crate::tool::Answer;
 
 /// The weakest effect that the bars speak of, with the calibration's own tolerance.
@@ -26,7 +26,9 @@ pub struct Named {
     pub confusable_with: Vec<String>,
     /// Strength of the evidence by the tool's own criterion: `evidence.delta_bic`.
     pub score: f64,
-    /// Whether it is one of the concealed effects (or may stand beside it).
+    /// Whether it is one of the concealed effects.
+    pub accepted: bool,
+    /// The same, or it may stand beside them, or is true of the measuring chain.
     pub right: bool,
 }
 
@@ -42,28 +44,6 @@ pub struct FigureCase {
     /// Standard deviation that least squares with the true form could reach on these recordings; none where the
     /// parameter is not the strength that the effect was calibrated by.
     pub attainable_std: Option<f64>,
-}
-
-/// How a fresh run was predicted, in mean squared errors (N²) against the noise-free reading.
-#[derive(Clone, Debug, Serialize)]
-pub struct GainCase {
-    pub file: String,
-    pub repaired: f64,
-    pub base: f64,
-    pub floor: f64,
-    pub floor_best: f64,
-    /// Share of the oracle's gain above the floor; absent where the base is as good as the floor.
-    pub share: Option<f64>,
-    /// The same with the floor of an oracle that smooths its inputs.
-    pub share_of_best: Option<f64>,
-    /// Repaired worse than base by over 1 % of its mean squared error.
-    pub worse: bool,
-    /// The base worse than plain least squares of the law on the raw channels by over 1 %.
-    pub base_worse: bool,
-    /// Where the run stands in the campaign's order: `first`, `middle` or `last`.
-    pub place: String,
-    /// Scored samples whose reading lies within the 90 % band of the repaired prediction, of so many.
-    pub in_band: (usize, usize),
 }
 
 /// What the measuring chain did, and whether `chain` says so.
@@ -89,6 +69,14 @@ pub struct Case {
     pub vehicle_sensor: String,
     /// Whether the recordings came through a real measuring chain.
     pub real_chain: bool,
+    /// The one concealed effect is of a sort that the real chain before it has as well: judged by `timing_right` alone.
+    pub of_the_chain: bool,
+    /// Of such a campaign, whether the net delay is told, or the lag or ripple named.
+    pub timing_right: Option<bool>,
+    /// Speed channels of a real chain that `chain` should call late or early.
+    pub late: Vec<LateCase>,
+    /// What `chain` says on ideal sensors that is not there.
+    pub false_findings: Vec<String>,
     pub truth: Vec<String>,
     pub forms: Vec<String>,
     pub strength: Vec<f64>,
@@ -99,7 +87,7 @@ pub struct Case {
     pub whiteness_p: Option<f64>,
     /// What stands alone in the measuring chain, and whether `chain` says so.
     pub finding: Option<FindingCase>,
-    /// Whether anything is named that neither was concealed nor is of the chain.
+    /// Whether anything is named that neither was concealed nor is of the chain, or explained by a column that leaks.
     pub false_physics: bool,
     /// What of the answer breaks the contract.
     pub breaches: Vec<String>,
@@ -110,6 +98,8 @@ pub struct Case {
     /// None where the contract has no word for the variable.
     pub variable_right: Option<bool>,
     pub figures: Vec<FigureCase>,
+    /// The base law's parameters, of null campaigns.
+    pub base: Vec<FigureCase>,
     pub gains: Vec<GainCase>,
     /// Intersection over union of the intervals, in the balances of the concealed effects.
     pub iou: Option<f64>,
@@ -143,6 +133,7 @@ impl Case {
                 }
                 "outside" => !self.honest || self.variable_right == Some(false),
                 "pair" => self.f1 < 1.0,
+                _ if self.of_the_chain => self.timing_right == Some(false),
                 _ => self.weakest() >= BAR_STRENGTH && !self.first_right,
             }
             || self
@@ -229,70 +220,41 @@ impl Case {
 /// Judges an answer.
 pub fn judge(campaigns: &Path, truth: &Truth, answer: &Answer) -> Result<Case> {
     let diagnosis = &answer.diagnosis;
-    let accepted = |id: &str| {
-        truth
-            .concealed
-            .iter()
-            .any(|concealed| concealed.accept.iter().any(|name| name == id))
-    };
-    let tolerated = |id: &str| {
-        truth
-            .concealed
-            .iter()
-            .any(|concealed| concealed.tolerated.iter().any(|name| name == id))
-    };
-    let of_the_chain = |id: &str| truth.tolerated.iter().any(|name| name == id);
     let mechanisms = list(diagnosis, "mechanisms");
+    let standings: Vec<Standing> = mechanisms
+        .iter()
+        .map(|mechanism| standing_of(truth, mechanism))
+        .collect();
     let named: Vec<Named> = mechanisms
         .iter()
-        .map(|mechanism| {
-            let id = text(mechanism, "id").to_owned();
-            Named {
-                right: accepted(&id) || tolerated(&id) || of_the_chain(&id),
-                confidence: mechanism
-                    .get("evidence")
-                    .map_or(f64::NAN, |evidence| number(evidence, "confidence")),
-                confusable_with: list(mechanism, "confusable_with")
-                    .iter()
-                    .map(|other| text(other, "id").to_owned())
-                    .collect(),
-                score: mechanism
-                    .get("evidence")
-                    .map_or(f64::NAN, |evidence| number(evidence, "delta_bic")),
-                id,
-            }
+        .zip(&standings)
+        .map(|(mechanism, standing)| Named {
+            id: text(mechanism, "id").to_owned(),
+            accepted: *standing == Standing::Accepted,
+            right: *standing != Standing::False,
+            confidence: evidence(mechanism, "confidence"),
+            confusable_with: list(mechanism, "confusable_with")
+                .iter()
+                .map(|other| text(other, "id").to_owned())
+                .collect(),
+            score: evidence(mechanism, "delta_bic"),
         })
         .collect();
-    // What the measuring chain itself makes true is neither the answer nor in its way.
-    let first = named
-        .iter()
-        .find(|named| accepted(&named.id) || !of_the_chain(&named.id));
-    let first_right = first.is_some_and(|first| accepted(&first.id));
+    let first = names::first(&standings).map(|place| &named[place]);
+    let first_right = first.is_some_and(|first| first.accepted);
     let in_set = first_right
-        || first.is_some_and(|first| first.confusable_with.iter().any(|other| accepted(other)));
-    let hits = truth
-        .concealed
-        .iter()
-        .filter(|concealed| {
-            named
+        || first.is_some_and(|first| {
+            first
+                .confusable_with
                 .iter()
-                .any(|named| concealed.accept.contains(&named.id))
-        })
-        .count();
-    let judged = named
+                .any(|other| standing(truth, other) == Standing::Accepted)
+        });
+    let told: Vec<(&str, Standing)> = named
         .iter()
-        .filter(|named| accepted(&named.id) || !(tolerated(&named.id) || of_the_chain(&named.id)))
-        .count();
-    let wanted = truth
-        .concealed
-        .iter()
-        .filter(|concealed| concealed.effect.id != "outside")
-        .count();
-    let f1 = if judged + wanted == 0 {
-        1.0
-    } else {
-        2.0 * hits as f64 / (judged + wanted) as f64
-    };
+        .zip(&standings)
+        .map(|(named, standing)| (named.id.as_str(), *standing))
+        .collect();
+    let f1 = names::f1(truth, &told);
     let verdict = text(diagnosis, "verdict").to_owned();
     let unexplained: Vec<String> = list(diagnosis, "unexplained")
         .iter()
@@ -336,7 +298,11 @@ pub fn judge(campaigns: &Path, truth: &Truth, answer: &Answer) -> Result<Case> {
         wheel_sensor: truth.instruments.wheel.word().to_owned(),
         vehicle_sensor: truth.instruments.vehicle.word().to_owned(),
         real_chain: truth.instruments.kind == ChainKind::Real,
-        false_physics: named.iter().any(|named| !named.right),
+        of_the_chain: timing::of_the_chain(truth),
+        timing_right: timing::right(truth, diagnosis),
+        late: timing::late(truth, diagnosis),
+        false_findings: false_findings(truth, diagnosis),
+        false_physics: named.iter().any(|named| !named.right) || by_leak(truth, diagnosis),
         whiteness_p: diagnosis
             .pointer("/fit/fit/after/whiteness_p")
             .and_then(Value::as_f64),
@@ -363,6 +329,7 @@ pub fn judge(campaigns: &Path, truth: &Truth, answer: &Answer) -> Result<Case> {
         f1,
         variable_right,
         figures: figures(truth, mechanisms),
+        base: base(truth, diagnosis),
         gains: gains(campaigns, truth, answer)?,
         iou: overlap(truth, diagnosis, &own),
         iou_all: overlap(truth, diagnosis, &all),
@@ -385,8 +352,72 @@ fn word(value: &impl Serialize) -> String {
         .unwrap_or_default()
 }
 
+/// A number of a mechanism's evidence.
+fn evidence(mechanism: &Value, key: &str) -> f64 {
+    mechanism
+        .get("evidence")
+        .map_or(f64::NAN, |evidence| number(evidence, key))
+}
+
+/// How a mechanism stands, its sign included: a speed that the chain makes late is not early.
+fn standing_of(truth: &Truth, mechanism: &Value) -> Standing {
+    let id = text(mechanism, "id");
+    let early = matches!(id, "vehicle_speed_delay" | "wheel_speed_delay")
+        && list(mechanism, "parameters").iter().any(|parameter| {
+            text(parameter, "name") == "delay" && number(parameter, "value") < 0.0
+        });
+    match standing(truth, id) {
+        Standing::OfTheChain if early => Standing::False,
+        standing => standing,
+    }
+}
+
+/// Whether a mismatch is put down to a column that reproduces the drag, which explains nothing.
+fn by_leak(truth: &Truth, diagnosis: &Value) -> bool {
+    truth.instruments.leak
+        && truth.column.as_deref().is_some_and(|column| {
+            ["unexplained", "regions"].iter().any(|key| {
+                list(diagnosis, key)
+                    .iter()
+                    .any(|entry| text(entry, "variable") == column)
+            })
+        })
+}
+
+/// The base law's parameters of a campaign in which nothing is missing.
+fn base(truth: &Truth, diagnosis: &Value) -> Vec<FigureCase> {
+    if truth.stratum != "null" {
+        return Vec::new();
+    }
+    [
+        ("peak_friction", truth.base.peak_friction),
+        ("critical_slip", truth.base.critical_slip),
+    ]
+    .into_iter()
+    .filter_map(|(name, truth)| {
+        let told = diagnosis.get("base")?.get(name)?;
+        let (value, std) = (number(told, "value"), number(told, "std"));
+        Some(FigureCase {
+            mechanism: "base".to_owned(),
+            name: name.to_owned(),
+            truth,
+            value,
+            std,
+            pull: pull(value, truth, std),
+            attainable_std: None,
+        })
+    })
+    .collect()
+}
+
+/// An error in its own standard deviations.
+fn pull(value: f64, truth: f64, std: f64) -> f64 {
+    (value - truth) / std.max(1e-12 * truth.abs()).max(f64::MIN_POSITIVE)
+}
+
 fn figures(truth: &Truth, mechanisms: &[Value]) -> Vec<FigureCase> {
     let mut cases = Vec::new();
+    let chain = Timing::of_chain(truth);
     for concealed in &truth.concealed {
         let Some(mechanism) = mechanisms
             .iter()
@@ -411,6 +442,11 @@ fn figures(truth: &Truth, mechanisms: &[Value]) -> Vec<FigureCase> {
                 .values
                 .iter()
                 .map(|truth| if unsigned { truth.abs() } else { *truth })
+                // A delay is told as it shows: with that of the chain.
+                .map(|truth| match figure.name.as_str() {
+                    "delay" => truth + chain.added(&concealed.effect.id),
+                    _ => truth,
+                })
                 .min_by(|a, b| (a - value).abs().total_cmp(&(b - value).abs()));
             if let Some(true_value) = nearest {
                 cases.push(FigureCase {
@@ -419,155 +455,13 @@ fn figures(truth: &Truth, mechanisms: &[Value]) -> Vec<FigureCase> {
                     truth: true_value,
                     value,
                     std,
-                    pull: (value - true_value)
-                        / std.max(1e-12 * true_value.abs()).max(f64::MIN_POSITIVE),
+                    pull: pull(value, true_value, std),
                     attainable_std: figure.attainable_std,
                 });
             }
         }
     }
     cases
-}
-
-/// Samples whose written reading lies within 1.645 stated standard deviations of the prediction: nine in ten of them
-/// if these are right.
-fn in_band(predicted: &[f64], sigma: &[f64], written: &[f64], scored: &[f64]) -> (usize, usize) {
-    let mut found = (0, 0);
-    for (((predicted, sigma), written), scored) in
-        predicted.iter().zip(sigma).zip(written).zip(scored)
-    {
-        if *scored > 0.5 && written.is_finite() {
-            found.0 += usize::from((written - predicted).abs() <= 1.645 * sigma);
-            found.1 += 1;
-        }
-    }
-    found
-}
-
-/// Plain least squares of the law on the raw channels of the fitted runs.
-fn least_squares(campaigns: &Path, truth: &Truth) -> Result<Base> {
-    let mut runs = Vec::new();
-    for number in 1.. {
-        let path = campaigns
-            .join(&truth.campaign)
-            .join(format!("run{number:02}.csv"));
-        if !path.exists() {
-            break;
-        }
-        runs.push(read_run(&path, &truth.rig)?);
-    }
-    Ok(refit(&truth.rig, &runs))
-}
-
-/// A fresh run's drag by the law alone.
-fn plain_base(campaigns: &Path, truth: &Truth, file: &str, base: Base) -> Option<Vec<f64>> {
-    let path = campaigns.join("fresh").join(&truth.campaign).join(file);
-    let run = read_run(&path, &truth.rig).ok()?;
-    Some(
-        (0..run.time.len())
-            .map(|index| base_drag(&truth.rig, base, &run, index))
-            .collect(),
-    )
-}
-
-/// What `chain` says of the one effect of a chain that a campaign has.
-fn finding(truth: &Truth, diagnosis: &Value) -> Option<FindingCase> {
-    let first = truth.findings.first()?;
-    let said = |wanted: &Finding| {
-        list(diagnosis, "chain")
-            .iter()
-            .find(|entry| {
-                text(entry, "channel") == wanted.channel && text(entry, "finding") == wanted.finding
-            })
-            .map(|entry| (number(entry, "value"), number(entry, "std")))
-    };
-    let right = |wanted: &Finding| {
-        // A time may be off by 2 ms, whatever its size.
-        let slack: f64 = if matches!(wanted.finding.as_str(), "late" | "low_passed" | "held") {
-            2e-3
-        } else {
-            0.0
-        };
-        said(wanted).is_some_and(|(value, _)| {
-            (value - wanted.value).abs() <= slack.max(0.2 * wanted.value.abs())
-        })
-    };
-    Some(FindingCase {
-        channel: first.channel.clone(),
-        finding: first.finding.clone(),
-        truth: first.value,
-        reported: truth.findings.iter().find_map(said),
-        right: truth.findings.iter().any(right),
-    })
-}
-
-fn gains(campaigns: &Path, truth: &Truth, answer: &Answer) -> Result<Vec<GainCase>> {
-    let mut cases = Vec::new();
-    let least_squares = least_squares(campaigns, truth)?;
-    for fresh in &truth.fresh {
-        let sealed = campaigns
-            .join("sealed")
-            .join(&truth.campaign)
-            .join(&fresh.file);
-        let reading = read_column(&sealed, "drag_force_n").context("sealed reading")?;
-        let scored = read_column(&sealed, "scored")?;
-        let Some(prediction) = answer
-            .predictions
-            .iter()
-            .find(|prediction| prediction.file == fresh.file)
-        else {
-            continue;
-        };
-        let error = |predicted: &[f64]| -> f64 {
-            if predicted.len() != reading.len() {
-                return f64::INFINITY;
-            }
-            let mut sum = 0.0;
-            let mut count = 0.0;
-            for ((predicted, reading), scored) in predicted.iter().zip(&reading).zip(&scored) {
-                if *scored > 0.5 {
-                    sum += if predicted.is_finite() {
-                        (predicted - reading).powi(2)
-                    } else {
-                        f64::INFINITY
-                    };
-                    count += 1.0;
-                }
-            }
-            if count > 0.0 { sum / count } else { f64::NAN }
-        };
-        let predicted = |path: &Path| read_column(path, "drag_force_n").unwrap_or_default();
-        let plain = plain_base(campaigns, truth, &fresh.file, least_squares)
-            .map(|predicted| error(&predicted));
-        let in_band = in_band(
-            &predicted(&prediction.repaired),
-            &read_column(&prediction.repaired, "drag_force_sigma_n").unwrap_or_default(),
-            &read_column(&sealed, "written_drag_force_n")?,
-            &scored,
-        );
-        let (repaired, base) = (
-            error(&predicted(&prediction.repaired)),
-            error(&predicted(&prediction.base)),
-        );
-        let share = |floor: f64| {
-            (fresh.gain_scored && base > 1.25 * floor && base.is_finite())
-                .then(|| 1.0 - (repaired - floor) / (base - floor))
-        };
-        cases.push(GainCase {
-            file: fresh.file.clone(),
-            repaired,
-            base,
-            floor: fresh.floor,
-            floor_best: fresh.floor_best,
-            share: share(fresh.floor),
-            share_of_best: share(fresh.floor_best),
-            worse: repaired.is_nan() || repaired > 1.01 * base,
-            base_worse: plain.is_some_and(|plain| base > 1.01 * plain),
-            place: fresh.place.clone(),
-            in_band,
-        });
-    }
-    Ok(cases)
 }
 
 /// Intersection over union of the intervals in some balances; absent where the truth has none.
@@ -636,11 +530,12 @@ fn overlap(truth: &Truth, diagnosis: &Value, balances: &[&str]) -> Option<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::judge::family::toy;
 
     #[test]
     fn overlap_is_intersection_over_union_of_the_balances_asked_for() {
         let interval = |start: f64, end: f64| serde_json::json!({"recording": "a/run01.csv", "balance": "tyre", "channel": "", "start_s": start, "end_s": end, "z": 1.0});
-        let mut truth: Truth = minimal();
+        let mut truth = toy::truth("null", "", "", 0.0);
         truth.intervals = vec![crate::generate::measure::Interval {
             recording: "run01.csv".into(),
             balance: "tyre".into(),
@@ -661,16 +556,48 @@ mod tests {
         assert_eq!(overlap(&truth, &diagnosis, &["wheel"]), None);
     }
 
-    fn minimal() -> Truth {
-        let order = crate::generate::campaign::Order {
-            stratum: "null".into(),
-            forms: vec![],
-            strength: vec![],
-            null: Some(crate::generate::campaign::NullKind::White),
-            chain: crate::generate::instrument::ChainKind::Ideal,
-        };
-        crate::generate::campaign::make("campaign-0000", 5, &order)
-            .unwrap()
-            .truth
+    #[test]
+    fn a_delay_that_the_chain_makes_has_a_sign() {
+        let mut truth = toy::truth("null", "", "", 0.0);
+        truth.tolerated = vec!["vehicle_speed_delay".into()];
+        let named = |delay: f64| serde_json::json!({"id": "vehicle_speed_delay", "parameters": [{"name": "delay", "value": delay}]});
+        assert_eq!(standing_of(&truth, &named(0.02)), Standing::OfTheChain);
+        assert_eq!(standing_of(&truth, &named(-0.02)), Standing::False);
+    }
+
+    #[test]
+    fn a_leaking_column_explains_nothing() {
+        let mut truth = toy::truth("chain", "", "", 0.0);
+        truth.column = Some("copy_n".into());
+        let left = serde_json::json!({"unexplained": [{"variable": "copy_n"}]});
+        let region = serde_json::json!({"regions": [{"variable": "copy_n"}]});
+        assert!(!by_leak(&truth, &left));
+        truth.instruments.leak = true;
+        assert!(by_leak(&truth, &left) && by_leak(&truth, &region));
+        assert!(!by_leak(
+            &truth,
+            &serde_json::json!({"unexplained": [{"variable": "slip"}]})
+        ));
+    }
+
+    #[test]
+    fn a_delay_is_judged_with_that_of_its_chain() {
+        let mut truth = toy::truth("single", "wheel_speed_delay", "delay", 0.03);
+        truth.instruments.wheel_late_s = 0.02;
+        truth.instruments.analogue_late_s = 0.005;
+        let named = serde_json::json!({"id": "wheel_speed_delay", "parameters": [{"name": "delay", "value": 0.044, "std": 0.001}]});
+        let told = figures(&truth, &[named]);
+        assert!((told[0].truth - 0.045).abs() < 1e-12 && (told[0].pull + 1.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn the_base_of_a_null_is_held_to_its_truth() {
+        let truth = toy::truth("null", "", "", 0.0);
+        let peak = truth.base.peak_friction;
+        let diagnosis =
+            serde_json::json!({"base": {"peak_friction": {"value": peak + 0.02, "std": 0.01}}});
+        let told = base(&truth, &diagnosis);
+        assert_eq!(told.len(), 1);
+        assert!((told[0].pull - 2.0).abs() < 1e-9);
     }
 }

@@ -3,7 +3,8 @@
 
 use std::collections::BTreeMap;
 
-use crate::judge::case::{BAR_STRENGTH, Case};
+use crate::judge::case::Case;
+use crate::judge::tally;
 use crate::table::Table;
 
 /// What was wrong with a case, in one line.
@@ -55,10 +56,15 @@ pub fn symptom(case: &Case) -> String {
                 .truth
                 .iter()
                 .zip(&case.strength)
-                .filter(|(id, _)| !found.contains(&id.as_str()))
+                .filter(|(id, _)| !case.of_the_chain && !found.contains(&id.as_str()))
                 .map(|(id, size)| format!("{id} ({size:.1} sigma)"))
                 .collect();
-            if !(missing.is_empty() || case.stratum == "single" && case.first_right) {
+            if case.of_the_chain && case.timing_right == Some(false) {
+                said.push(format!(
+                    "{} before a chain that has its own was not told as it shows",
+                    case.truth.join(" and ")
+                ));
+            } else if !(missing.is_empty() || case.stratum == "single" && case.first_right) {
                 said.push(match (case.verdict.as_str(), wrong.is_empty()) {
                     ("consistent", _) => format!("{} went unseen", missing.join(" and ")),
                     (_, false) => format!("{} was taken for {wrong}", missing.join(" and ")),
@@ -171,11 +177,8 @@ pub fn shortfalls(cases: &[Case]) -> Table {
             |named| named.id.clone(),
         )
     };
-    let strong: Vec<&Case> = of("single")
-        .into_iter()
-        .filter(|case| case.weakest() >= BAR_STRENGTH)
-        .collect();
-    row("false physics, nothing missing", of("null"), &|case| {
+    let strong: Vec<&Case> = tally::strong(cases).collect();
+    row("false names, nothing missing", of("null"), &|case| {
         if !case.false_physics {
             return vec![];
         }
@@ -209,6 +212,23 @@ pub fn shortfalls(cases: &[Case]) -> Table {
             case.forms.join("+")
         )]
     });
+    row(
+        "what a real chain has too, not told",
+        {
+            let timed = cases.iter().filter(|case| case.of_the_chain);
+            timed.collect()
+        },
+        &|case| {
+            if case.timing_right != Some(false) {
+                return vec![];
+            }
+            vec![format!(
+                "{} for {}",
+                first_named(case),
+                case.forms.join("+")
+            )]
+        },
+    );
     row("pairs, an effect not found", of("pair"), &|case| {
         case.truth
             .iter()

@@ -18,6 +18,9 @@ pub enum Family {
 /// All families.
 pub const FAMILIES: [Family; 3] = [Family::Together, Family::Ideal, Family::Chains];
 
+/// The two that are told apart.
+pub const APART: [Family; 2] = [Family::Ideal, Family::Chains];
+
 impl Family {
     /// What a reader calls it.
     pub fn name(self) -> &'static str {
@@ -25,6 +28,15 @@ impl Family {
             Family::Together => "all",
             Family::Ideal => "ideal",
             Family::Chains => "chains",
+        }
+    }
+
+    /// In words.
+    pub fn words(self) -> &'static str {
+        match self {
+            Family::Together => "all sensors",
+            Family::Ideal => "ideal sensors",
+            Family::Chains => "real chains",
         }
     }
 
@@ -65,9 +77,7 @@ impl Family {
 
 /// The families worth telling apart: all, and each by itself where there is more than one.
 pub fn families(cases: &[Case]) -> Vec<Family> {
-    let both = [Family::Ideal, Family::Chains]
-        .iter()
-        .all(|family| family.of(cases).next().is_some());
+    let both = APART.iter().all(|family| family.of(cases).next().is_some());
     FAMILIES
         .into_iter()
         .filter(|family| *family == Family::Together || both)
@@ -100,9 +110,55 @@ pub fn resampled(sizes: &[usize], statistic: impl Fn(&[Vec<usize>]) -> f64) -> (
 
 #[cfg(test)]
 pub mod toy {
+    use std::sync::OnceLock;
+
     use super::*;
+    use crate::generate::campaign::{Concealed, Figure, NullKind, Order, Truth, make};
+    use crate::generate::effect::Effect;
+    use crate::generate::form::Form;
+    use crate::generate::instrument::ChainKind;
     use crate::judge::case::{FigureCase, Named};
     use crate::judge::headline::Headline;
+
+    /// Truth of a campaign on ideal sensors, with one effect of one figure unless the mechanism is empty.
+    pub fn truth(stratum: &str, mechanism: &str, figure: &str, value: f64) -> Truth {
+        static PLAIN: OnceLock<Truth> = OnceLock::new();
+        let plain = PLAIN.get_or_init(|| {
+            let order = Order {
+                stratum: "null".into(),
+                forms: vec![],
+                strength: vec![],
+                null: Some(NullKind::White),
+                chain: ChainKind::Ideal,
+            };
+            make("campaign-0000", 5, &order).unwrap().truth
+        });
+        let mut truth = plain.clone();
+        truth.stratum = stratum.to_owned();
+        if !mechanism.is_empty() {
+            truth.concealed = vec![Concealed {
+                effect: Effect {
+                    id: mechanism.to_owned(),
+                    balance: "tyre".into(),
+                    form: Form::DelayPure,
+                    a: value,
+                    a_range: (0.0, 1.0),
+                    p: [0.0; 6],
+                    strength_sigma: 1.0,
+                },
+                figures: vec![Figure {
+                    name: figure.to_owned(),
+                    unit: String::new(),
+                    values: vec![value],
+                    attainable_std: None,
+                }],
+                accept: vec![mechanism.to_owned()],
+                tolerated: vec![],
+                variables: vec![],
+            }];
+        }
+        truth
+    }
 
     /// A campaign that nothing is known of.
     pub fn case(stratum: &str, real_chain: bool) -> Case {
@@ -113,6 +169,10 @@ pub mod toy {
             wheel_sensor: "ideal".into(),
             vehicle_sensor: "ideal".into(),
             real_chain,
+            of_the_chain: false,
+            timing_right: None,
+            late: vec![],
+            false_findings: vec![],
             truth: vec![],
             forms: vec![],
             strength: vec![],
@@ -129,6 +189,7 @@ pub mod toy {
             honest: false,
             variable_right: None,
             figures: vec![],
+            base: vec![],
             gains: vec![],
             iou: None,
             iou_all: None,
@@ -147,6 +208,7 @@ pub mod toy {
             confidence,
             confusable_with: vec![],
             score,
+            accepted: right,
             right,
         }
     }

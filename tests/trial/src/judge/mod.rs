@@ -3,6 +3,7 @@
 //! | what | module |
 //! | --- | --- |
 //! | one answer | [`case`] |
+//! | its names, delays, findings and predictions | [`names`], [`timing`], [`findings`], [`gain`] |
 //! | all answers | [`score`] |
 //! | one figure | [`headline`] |
 //! | figures and tables | [`tally`], [`bars`], [`cause`] |
@@ -17,12 +18,16 @@ pub mod case;
 pub mod cause;
 pub mod coverage;
 pub mod family;
+pub mod findings;
+pub mod gain;
 pub mod headline;
+pub mod names;
 pub mod power;
 pub mod prediction;
 pub mod rivals;
 pub mod score;
 pub mod tally;
+pub mod timing;
 pub mod uniform;
 
 use case::Case;

@@ -4,7 +4,7 @@
 //! the score: what one null campaign in twenty exceeds.
 
 use crate::judge::case::Case;
-use crate::judge::family::{Family, resampled};
+use crate::judge::family::{APART, Family, resampled};
 use crate::judge::headline::{Better, Headline};
 use crate::judge::tally::of;
 use crate::share::{Share, percent, quantile};
@@ -38,15 +38,22 @@ pub struct Curve {
     pub points: Vec<Point>,
 }
 
-/// Strongest evidence that the campaign's answer claims; nothing named is none. On a null a name that the measuring
-/// chain makes true is no alarm.
+/// Of a null, the strongest evidence that its answer claims for what is not there; of an effect, the evidence of the
+/// first name that is right, which nothing named beside it may lend.
 fn score(case: &Case) -> f64 {
-    case.named
-        .iter()
-        .filter(|named| !(case.stratum == "null" && named.right))
-        .map(|named| named.score)
-        .filter(|score| score.is_finite())
-        .fold(0.0, f64::max)
+    let score = |score: f64| if score.is_finite() { score } else { 0.0 };
+    if case.stratum == "null" {
+        case.named
+            .iter()
+            .filter(|named| !named.right)
+            .map(|named| score(named.score))
+            .fold(0.0, f64::max)
+    } else {
+        case.named
+            .iter()
+            .find(|named| named.accepted)
+            .map_or(0.0, |named| score(named.score))
+    }
 }
 
 /// The bin of a size.
@@ -64,7 +71,7 @@ pub fn curve(cases: &[Case], family: Family) -> Option<Curve> {
         .map(score)
         .collect();
     let mut singles: Vec<Vec<(f64, bool)>> = vec![Vec::new(); SIZES.len()];
-    for case in of(cases, "single").filter(|case| family.holds(case)) {
+    for case in of(cases, "single").filter(|case| family.holds(case) && !case.of_the_chain) {
         singles[bin(case.weakest())].push((score(case), case.first_right));
     }
     if nulls.is_empty() || singles.iter().all(Vec::is_empty) {
@@ -101,7 +108,7 @@ pub fn curve(cases: &[Case], family: Family) -> Option<Curve> {
 
 /// Curves of ideal sensors and of chains, where there are any.
 pub fn curves(cases: &[Case]) -> Vec<Curve> {
-    [Family::Ideal, Family::Chains]
+    APART
         .into_iter()
         .filter_map(|family| curve(cases, family))
         .collect()
@@ -231,6 +238,32 @@ mod tests {
         let keys: Vec<String> = headlines(&cases).into_iter().map(|h| h.key).collect();
         assert_eq!(keys, ["power.1.ideal", "power.4.ideal"]);
         assert!(super::curve(&cases, Family::Chains).is_none());
+    }
+
+    #[test]
+    fn another_names_evidence_does_not_help() {
+        let mut cases: Vec<Case> = (0..=20)
+            .map(|score| {
+                let mut case = toy::case("null", false);
+                case.named = vec![toy::named(0.9, f64::from(score), false)];
+                case
+            })
+            .collect();
+        // Right first on thin evidence, beside a strong name: one that is false, one that is true of the chain.
+        let mut beside = toy::named(0.9, 500.0, true);
+        beside.accepted = false;
+        for other in [toy::named(0.9, 500.0, false), beside] {
+            let mut case = single(1.0, 5.0, true);
+            case.named.push(other);
+            cases.push(case);
+        }
+        let found = |cases: &[Case]| curve(cases, Family::Ideal).unwrap().points[0].found.hits;
+        assert_eq!(found(&cases), 0);
+        cases.push(single(1.0, 50.0, true));
+        assert_eq!(found(&cases), 1);
+        // What the chain has as well is judged apart.
+        cases.last_mut().unwrap().of_the_chain = true;
+        assert_eq!(found(&cases), 0);
     }
 
     #[test]

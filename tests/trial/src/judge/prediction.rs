@@ -1,7 +1,8 @@
 //! Predictions of unseen runs: better than the base's, and as sure as they say.
 
-use crate::judge::case::{Case, GainCase};
+use crate::judge::case::Case;
 use crate::judge::family::{Family, families};
+use crate::judge::gain::GainCase;
 use crate::judge::headline::{Better, Headline};
 use crate::share::{Share, mean, percent};
 use crate::table::Table;
@@ -140,6 +141,7 @@ mod tests {
                 base_worse: false,
                 place: (*place).to_owned(),
                 in_band: (if *place == "last" { 80 } else { 100 }, 100),
+                band_score: None,
             })
             .collect();
         let told = headlines(&[case]);

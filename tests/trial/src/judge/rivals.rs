@@ -5,6 +5,8 @@ use std::collections::BTreeMap;
 use crate::baseline::Verdicts;
 use crate::generate::campaign::Truth;
 use crate::judge::case::{BAR_STRENGTH, Case};
+use crate::judge::names::{self, Standing, standing};
+use crate::judge::timing;
 use crate::share::{Share, mean, percent};
 use crate::table::Table;
 
@@ -12,8 +14,10 @@ use crate::table::Table;
 struct Answer<'a> {
     stratum: &'a str,
     real_chain: bool,
+    /// The chain has the concealed effect as well: not counted among the single ones.
+    of_the_chain: bool,
     weakest: f64,
-    /// Physics named that is not there; of a test that names nothing, any alarm.
+    /// Names of what is not there; of a test that names nothing, any alarm.
     alarm: bool,
     /// None where the method names nothing by its nature.
     first_right: Option<bool>,
@@ -28,6 +32,7 @@ impl<'a> Answer<'a> {
         Answer {
             stratum: &case.stratum,
             real_chain: case.real_chain,
+            of_the_chain: case.of_the_chain,
             weakest: case.weakest(),
             alarm: case.false_physics,
             first_right: Some(case.first_right),
@@ -38,15 +43,16 @@ impl<'a> Answer<'a> {
 
     /// Of a method that gives names alone.
     fn of_names(truth: &'a Truth, real_chain: bool, names: &[&str]) -> Answer<'a> {
+        let told: Vec<(&str, Standing)> =
+            names.iter().map(|id| (*id, standing(truth, id))).collect();
+        let standings: Vec<Standing> = told.iter().map(|name| name.1).collect();
         Answer {
-            alarm: !false_names(truth, names).is_empty(),
+            alarm: standings.contains(&Standing::False),
             first_right: Some(
-                names
-                    .iter()
-                    .find(|id| !tolerated(truth, id))
-                    .is_some_and(|id| accepted(truth, id)),
+                names::first(&standings)
+                    .is_some_and(|place| standings[place] == Standing::Accepted),
             ),
-            f1: Some(f1(truth, names)),
+            f1: Some(names::f1(truth, &told)),
             says_so: None,
             ..Answer::of_whiteness(truth, real_chain, true)
         }
@@ -57,6 +63,7 @@ impl<'a> Answer<'a> {
         Answer {
             stratum: &truth.stratum,
             real_chain,
+            of_the_chain: timing::of_the_chain(truth),
             weakest: truth
                 .concealed
                 .iter()
@@ -67,58 +74,6 @@ impl<'a> Answer<'a> {
             f1: None,
             says_so: Some(!white),
         }
-    }
-}
-
-fn accepted(truth: &Truth, id: &str) -> bool {
-    truth
-        .concealed
-        .iter()
-        .any(|concealed| concealed.accept.iter().any(|name| name == id))
-}
-
-/// Whether a name may stand beside what is concealed without being wrong, and is not itself concealed.
-/// Nor are names that the measuring chain itself makes true.
-fn tolerated(truth: &Truth, id: &str) -> bool {
-    !accepted(truth, id)
-        && truth
-            .concealed
-            .iter()
-            .flat_map(|concealed| &concealed.tolerated)
-            .chain(&truth.tolerated)
-            .any(|name| name == id)
-}
-
-/// Names that are neither concealed nor tolerated.
-pub fn false_names<'n>(truth: &Truth, names: &[&'n str]) -> Vec<&'n str> {
-    names
-        .iter()
-        .copied()
-        .filter(|id| !accepted(truth, id) && !tolerated(truth, id))
-        .collect()
-}
-
-/// F1 of a set of names, those tolerated left out of it.
-fn f1(truth: &Truth, names: &[&str]) -> f64 {
-    let hits = truth
-        .concealed
-        .iter()
-        .filter(|concealed| {
-            names
-                .iter()
-                .any(|id| concealed.accept.iter().any(|name| name == id))
-        })
-        .count();
-    let judged = names.iter().filter(|id| !tolerated(truth, id)).count();
-    let wanted = truth
-        .concealed
-        .iter()
-        .filter(|concealed| concealed.effect.id != "outside")
-        .count();
-    if judged + wanted == 0 {
-        1.0
-    } else {
-        2.0 * hits as f64 / (judged + wanted) as f64
     }
 }
 
@@ -177,7 +132,7 @@ pub fn baselines(
         "Methods on the same files",
         &[
             "method",
-            "false physics, ideal nulls",
+            "false names, ideal nulls",
             "nulls through chains",
             "right first, ideal, from 0.6 sigma",
             "right first, chains",
@@ -189,7 +144,7 @@ pub fn baselines(
         table.row(cells(name, answers));
     }
     table.note = Some(
-        "False physics: a name that is neither concealed nor true of the measuring chain; of the whiteness test, any alarm. The textbook methods take every sample as independent; \"-\": not tried, or not in the method's nature."
+        "False names: those that are neither concealed nor true of the measuring chain; of the whiteness test, any alarm. The textbook methods take every sample as independent; \"-\": not tried, or not in the method's nature."
             .to_owned(),
     );
     table
@@ -212,7 +167,7 @@ fn cells(name: &str, answers: &[Answer]) -> [String; 7] {
             format!("{} ({}/{})", percent(share.value()), share.hits, share.of)
         }
     };
-    let strong = |answer: &Answer| answer.weakest >= BAR_STRENGTH;
+    let strong = |answer: &Answer| answer.weakest >= BAR_STRENGTH && !answer.of_the_chain;
     let f1: Vec<f64> = answers
         .iter()
         .filter(|answer| answer.stratum == "pair")

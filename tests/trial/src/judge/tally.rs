@@ -12,9 +12,14 @@ pub fn of<'a>(cases: &'a [Case], stratum: &'a str) -> impl Iterator<Item = &'a C
     cases.iter().filter(move |case| case.stratum == stratum)
 }
 
-/// Single effects strong enough for the bars.
+/// Single effects but for those that the chain before them has as well.
+pub fn single(cases: &[Case]) -> impl Iterator<Item = &Case> + Clone {
+    of(cases, "single").filter(|case| !case.of_the_chain)
+}
+
+/// Of these, strong enough for the bars.
 pub fn strong(cases: &[Case]) -> impl Iterator<Item = &Case> + Clone {
-    of(cases, "single").filter(|case| case.weakest() >= BAR_STRENGTH)
+    single(cases).filter(|case| case.weakest() >= BAR_STRENGTH)
 }
 
 /// Shares of the oracle's gain on all fresh runs on which it means anything.
@@ -28,10 +33,10 @@ pub fn shares(cases: &[Case]) -> Vec<f64> {
 /// False alarms by sort of null campaign.
 pub fn nulls(cases: &[Case]) -> Table {
     let mut table = Table::new(
-        "False physics by sort of null campaign",
+        "False names by sort of null campaign",
         &[
             "nothing missing",
-            "false physics",
+            "false names",
             "95 % interval",
             "n",
             "what was named, and how often",
@@ -95,7 +100,7 @@ pub fn chains(cases: &[Case]) -> Table {
             "found",
             "value within 20 % or 2 ms",
             "n",
-            "false physics",
+            "false names",
             "named",
         ],
     );
@@ -203,7 +208,7 @@ pub fn strengths(cases: &[Case]) -> Table {
         (1.5, 3.0),
         (3.0, 99.0),
     ] {
-        let group: Vec<&Case> = of(cases, "single")
+        let group: Vec<&Case> = single(cases)
             .filter(|case| (low..high).contains(&case.weakest()))
             .collect();
         if group.is_empty() {

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use crate::judge::case::Case;
-use crate::judge::family::Family;
+use crate::judge::family::{APART, Family};
 use crate::judge::headline::{Better, Headline};
 use crate::judge::tally::of;
 use crate::share::Share;
@@ -99,7 +99,7 @@ pub fn families(cases: &[Case]) -> Vec<Uniformity> {
             .or_default()
             .extend(p(case));
     }
-    [Family::Ideal, Family::Chains]
+    APART
         .into_iter()
         .filter_map(pooled)
         .chain(
