@@ -181,12 +181,12 @@ pub fn breaches(diagnosis: &Value) -> Vec<String> {
         }
     }
     for mechanism in list(diagnosis, "mechanisms") {
-        let Some(evidence) = mechanism.get("evidence") else {
-            continue;
-        };
-        if number(evidence, "confidence") > 0.5
-            && number(evidence, "holdout_nll_gain_per_sample") < 0.0
-        {
+        let evidence = mechanism.get("evidence").unwrap_or(&Value::Null);
+        let gain = number(evidence, "holdout_nll_gain_per_sample");
+        if gain.is_nan() {
+            let id = text(mechanism, "id");
+            found.push(format!("{id}: no holdout_nll_gain_per_sample"));
+        } else if number(evidence, "confidence") > 0.5 && gain < 0.0 {
             found.push("a name above 0.5 makes unseen runs worse".to_owned());
         }
     }
@@ -211,6 +211,8 @@ mod tests {
         assert!(breaches(&good).is_empty(), "{:?}", breaches(&good));
         let worse = json!({"looked_for": looked, "chain": [], "mechanisms": [named(-0.1)]});
         assert_eq!(breaches(&worse).len(), 1);
+        let silent = json!({"looked_for": looked, "chain": [], "mechanisms": [{"id": "force_lag", "evidence": {"confidence": 0.3}}]});
+        assert_eq!(breaches(&silent).len(), 1);
         let odd = json!({"looked_for": looked, "chain": [{"channel": "x", "finding": "tardy"}], "mechanisms": []});
         assert_eq!(breaches(&odd).len(), 3);
         let none = json!({"looked_for": [], "mechanisms": []});

@@ -23,6 +23,9 @@ pub fn crps(error: f64, std: f64) -> f64 {
         - 1.0 / std::f64::consts::PI.sqrt())
 }
 
+/// Share of normal errors within one and two standard deviations.
+const NORMAL: [f64; 2] = [0.6827, 0.9545];
+
 /// Factors on the standard deviations that are tried, in steps of 5 %, 1 in the middle.
 const STEPS: i32 = 61;
 
@@ -30,10 +33,20 @@ fn factor(step: usize) -> f64 {
     1.05f64.powi(step as i32 - STEPS)
 }
 
+/// What an error of a figure is told in: the true figure, or what is known of it where that is more, so that figures
+/// whose truth is next to nothing do not outweigh all others.
+fn scale(figure: &FigureCase) -> f64 {
+    [figure.truth.abs(), figure.std]
+        .into_iter()
+        .chain(figure.attainable_std)
+        .filter(|part| part.is_finite())
+        .fold(0.0, f64::max)
+}
+
 /// How well the standard deviations of some figures suit their errors.
 #[derive(Clone, Debug)]
 pub struct Sharpness {
-    /// For each campaign the CRPS of its figures, relative to the truth, at each factor.
+    /// For each campaign the CRPS of its figures, in their scale, at each factor.
     costs: Vec<Vec<f64>>,
     figures: usize,
 }
@@ -48,13 +61,14 @@ impl Sharpness {
             let mut cost = vec![0.0; 2 * STEPS as usize + 1];
             for figure in figures {
                 let error = figure.value - figure.truth;
-                // A score relative to a truth of nothing is none.
-                if !error.is_finite() || figure.truth.abs() < 1e-12 {
+                let scale = scale(figure);
+                // A score relative to nothing is none.
+                if !error.is_finite() || scale < 1e-12 {
                     continue;
                 }
                 sharpness.figures += 1;
                 for (step, sum) in cost.iter_mut().enumerate() {
-                    *sum += crps(error, factor(step) * figure.std) / figure.truth.abs();
+                    *sum += crps(error, factor(step) * figure.std) / scale;
                 }
             }
             sharpness.costs.push(cost);
@@ -72,7 +86,7 @@ impl Sharpness {
         total
     }
 
-    /// Mean CRPS, relative to the truth.
+    /// Mean CRPS, in the figures' scale.
     pub fn relative(&self) -> f64 {
         self.total(&mut (0..self.costs.len()))[STEPS as usize] / self.figures as f64
     }
@@ -129,9 +143,11 @@ pub fn table(cases: &[Case]) -> Table {
             "sensors",
             "n",
             "within 1 std",
+            "95 % interval",
             "within 2",
+            "95 % interval",
             "within 3",
-            "95 % interval of within 3",
+            "95 % interval",
             "std / attainable, median",
             "error, median",
             "std, median",
@@ -155,12 +171,16 @@ pub fn table(cases: &[Case]) -> Table {
         let middle = |value: &dyn Fn(&FigureCase) -> f64| {
             let values: Vec<f64> = figures
                 .iter()
-                .map(|figure| value(figure) / figure.truth.abs().max(1e-12))
+                .map(|figure| value(figure) / scale(figure).max(1e-12))
                 .collect();
             percent(quantile(&values, 0.5))
         };
         let share = |limit| within(figures.iter().copied(), limit);
-        let [three, interval, _] = share(3.0).cells();
+        let [
+            [one, one_interval, _],
+            [two, two_interval, _],
+            [three, interval, _],
+        ] = [1.0, 2.0, 3.0].map(|limit| share(limit).cells());
         let sharpness = Sharpness::of(campaigns);
         let total = sharpness.total(&mut (0..sharpness.costs.len()));
         // One factor for a handful of figures follows their luck.
@@ -172,8 +192,10 @@ pub fn table(cases: &[Case]) -> Table {
             key,
             family.name().to_owned(),
             figures.len().to_string(),
-            percent(share(1.0).value()),
-            percent(share(2.0).value()),
+            one,
+            one_interval,
+            two,
+            two_interval,
             three,
             interval,
             number(quantile(&widths(figures.iter().copied()), 0.5)),
@@ -199,6 +221,17 @@ pub fn table(cases: &[Case]) -> Table {
                 .push((case, figure));
         }
     }
+    for name in ["peak_friction", "critical_slip"] {
+        for family in parts {
+            let own = family.of(cases).flat_map(|case| &case.base);
+            let own = own.filter(|figure| figure.name == name);
+            row(
+                format!("base {name}, nothing missing"),
+                *family,
+                own.map(|figure| vec![figure]).collect(),
+            );
+        }
+    }
     for (key, group) in groups {
         for family in parts {
             let own = group.iter().filter(|pair| family.holds(pair.0));
@@ -206,7 +239,7 @@ pub fn table(cases: &[Case]) -> Table {
         }
     }
     table.note = Some(
-        "A normal error lies within 1, 2 and 3 of its standard deviations in 68, 95 and 99.7 % of cases. Attainable: what least squares with the true form could reach on the same recordings. CRPS: of the stated normal forecast (Gneiting and Raftery 2007), mean; error, std and CRPS relative to the true figure. CRPS / best: over that of the same errors with all standard deviations multiplied by the best single factor, so that wide and narrow both cost."
+        "A normal error lies within 1, 2 and 3 of its standard deviations in 68, 95 and 99.7 % of cases. Attainable: what least squares with the true form could reach on the same recordings. CRPS: of the stated normal forecast (Gneiting and Raftery 2007), mean; error, std and CRPS relative to the true figure, or to its std where that is more. CRPS / best: over that of the same errors with all standard deviations multiplied by the best single factor, so that wide and narrow both cost."
             .to_owned(),
     );
     table
@@ -221,22 +254,29 @@ pub fn headlines(cases: &[Case]) -> Vec<Headline> {
         let what = |words: &str| family.what(words);
         let campaigns = all_figures(cases, family);
         let figures: Vec<&FigureCase> = campaigns.iter().flatten().copied().collect();
-        for (limit, least, most) in [
-            (1, 0.60, Some(0.76)),
-            (2, 0.92, Some(0.98)),
-            (3, 0.985, None),
-        ] {
-            let share = within(figures.iter().copied(), f64::from(limit));
-            let words = format!("figures within {limit} of their std");
-            let stem = format!("figures.within{limit}");
-            let headline = |key: &str, better, bar| {
-                Headline::share(key, &what(&words), better, Some(bar), share)
-            };
-            all.push(headline(&key(&stem), Higher, least));
-            if let Some(most) = most {
-                all.push(headline(&key(&format!("{stem}.at_most")), Lower, most));
-            }
+        for (limit, nominal, half) in [(1, NORMAL[0], 0.08), (2, NORMAL[1], 0.03)] {
+            all.push(Headline::share_off_nominal(
+                &key(&format!("figures.within{limit}")),
+                &what(&format!("figures within {limit} of their std")),
+                Some(half),
+                nominal,
+                within(figures.iter().copied(), f64::from(limit)),
+            ));
         }
+        all.push(Headline::share(
+            &key("figures.within3"),
+            &what("figures within 3 of their std"),
+            Higher,
+            Some(0.985),
+            within(figures.iter().copied(), 3.0),
+        ));
+        all.push(Headline::share_off_nominal(
+            &key("base.within2"),
+            &what("nothing missing: base parameters within 2 of their std"),
+            Some(0.03),
+            NORMAL[1],
+            within(family.of(cases).flat_map(|case| &case.base), 2.0),
+        ));
         all.push(Headline::quantile(
             &key("figures.sharpness"),
             &what("std of figures over the attainable, median"),
@@ -300,19 +340,49 @@ mod tests {
     #[test]
     fn true_intervals_cover_and_false_ones_cost() {
         let honest = headlines(&figures(1.0));
-        assert!((toy::value(&honest, "figures.within1") - 0.683).abs() < 0.02);
-        assert!((toy::value(&honest, "figures.within2") - 0.954).abs() < 0.01);
+        assert!(toy::value(&honest, "figures.within1") < 0.02);
+        assert!(toy::value(&honest, "figures.within2") < 0.01);
         assert!((toy::value(&honest, "figures.within3") - 0.997).abs() < 0.003);
         assert!((toy::value(&honest, "figures.sharpness") - 1.0).abs() < 1e-9);
         assert!(toy::value(&honest, "figures.crps_ratio") < 1.002);
         for stated in [0.4, 2.5] {
             let told = headlines(&figures(stated));
+            // Too wide is as wrong as too narrow.
+            assert!(toy::value(&told, "figures.within1") > 0.25);
             assert!((toy::value(&told, "figures.sharpness") - stated).abs() < 1e-9);
             assert!(toy::value(&told, "figures.crps_ratio") > 1.1);
             let cases = figures(stated);
             let sharpness = Sharpness::of(all_figures(&cases, Family::Together));
             assert!((sharpness.best_factor() * stated - 1.0).abs() < 0.06);
         }
+    }
+
+    #[test]
+    fn a_truth_of_next_to_nothing_does_not_outweigh_all_others() {
+        let mut cases = figures(1.0);
+        let before = Sharpness::of(all_figures(&cases, Family::Together));
+        // Right within its std, where the truth is next to nothing, and where it is nothing.
+        let mut tiny = toy::figure(0.1, 0.1, Some(0.1));
+        tiny.truth = 1e-9;
+        tiny.value = 0.1;
+        let mut none = tiny.clone();
+        none.truth = 0.0;
+        cases[0].figures.extend([tiny, none]);
+        let after = Sharpness::of(all_figures(&cases, Family::Together));
+        assert_eq!(after.figures, before.figures + 2);
+        assert!((after.relative() / before.relative() - 1.0).abs() < 0.01);
+        assert!((after.ratio().0 / before.ratio().0 - 1.0).abs() < 0.01);
+    }
+
+    #[test]
+    fn base_parameters_of_nulls_are_held_to_their_std() {
+        let mut case = toy::case("null", false);
+        case.base = vec![toy::figure(0.1, 0.1, None), toy::figure(0.5, 0.1, None)];
+        case.base[1].name = "critical_slip".into();
+        let told = headlines(&[case.clone()]);
+        assert!((toy::value(&told, "base.within2") - 0.4545).abs() < 1e-12);
+        let rows = table(&[case]).rows;
+        assert_eq!(rows[0][0], "base critical_slip, nothing missing");
     }
 
     #[test]

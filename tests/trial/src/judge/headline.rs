@@ -39,6 +39,19 @@ pub struct Headline {
     pub of: usize,
     /// What it is to reach; none where it is only watched.
     pub bar: Option<f64>,
+    /// What one case may change of a number that is not a count of hits.
+    pub step: f64,
+    /// Of a distance from a nominal share, what a table shows in its place: the share with its interval.
+    pub shown: Option<Shown>,
+}
+
+/// A share beside the one that it should be.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct Shown {
+    pub nominal: f64,
+    pub value: f64,
+    pub low: f64,
+    pub high: f64,
 }
 
 impl Headline {
@@ -66,6 +79,8 @@ impl Headline {
             hits: Some(share.hits),
             of: share.of,
             bar,
+            step: 0.0,
+            shown: None,
         }
     }
 
@@ -126,7 +141,61 @@ impl Headline {
             hits: None,
             of,
             bar,
+            step: 0.0,
+            shown: None,
         }
+    }
+
+    /// The distance of a share from what it should be: too many is as wrong as too few. The bar is how far it may be off.
+    pub fn off_nominal(
+        key: &str,
+        what: &str,
+        bar: Option<f64>,
+        shown: Shown,
+        of: usize,
+    ) -> Headline {
+        let off = |share: f64| (share - shown.nominal).abs();
+        let (nearest, furthest) = if (shown.low..=shown.high).contains(&shown.nominal) {
+            (0.0, off(shown.low).max(off(shown.high)))
+        } else {
+            let ends = (off(shown.low), off(shown.high));
+            (ends.0.min(ends.1), ends.0.max(ends.1))
+        };
+        Headline {
+            unit: Unit::Percent,
+            step: 1.0 / of.max(1) as f64,
+            shown: Some(shown),
+            ..Headline::number(
+                key,
+                what,
+                Better::Lower,
+                bar,
+                (off(shown.value), nearest, furthest),
+                of,
+            )
+        }
+    }
+
+    /// The same of a counted share.
+    pub fn share_off_nominal(
+        key: &str,
+        what: &str,
+        bar: Option<f64>,
+        nominal: f64,
+        share: Share,
+    ) -> Headline {
+        let (low, high) = if share.of == 0 {
+            (f64::NAN, f64::NAN)
+        } else {
+            share.interval()
+        };
+        let shown = Shown {
+            nominal,
+            value: share.value(),
+            low,
+            high,
+        };
+        Headline::off_nominal(key, what, bar, shown, share.of)
     }
 
     fn print(&self, value: f64) -> String {
@@ -163,6 +232,9 @@ impl Headline {
     /// Cells of a row: what, bar, measured, interval, n, verdict.
     pub fn cells(&self) -> [String; 6] {
         let bar = self.bar.map_or_else(String::new, |bar| {
+            if let Some(shown) = self.shown {
+                return format!("{} ± {}", self.print(shown.nominal), self.print(bar));
+            }
             let sign = if self.better == Better::Higher {
                 "≥"
             } else {
@@ -170,8 +242,13 @@ impl Headline {
             };
             format!("{sign} {}", self.print(bar))
         });
-        let interval = if self.low.is_finite() && self.high.is_finite() {
-            format!("{}..{}", self.print(self.low), self.print(self.high))
+        let (value, low, high) = self
+            .shown
+            .map_or((self.value, self.low, self.high), |shown| {
+                (shown.value, shown.low, shown.high)
+            });
+        let interval = if low.is_finite() && high.is_finite() {
+            format!("{}..{}", self.print(low), self.print(high))
         } else {
             "-".to_owned()
         };
@@ -182,7 +259,7 @@ impl Headline {
         [
             self.what.clone(),
             bar,
-            self.print(self.value),
+            self.print(value),
             interval,
             n,
             self.verdict().to_owned(),
@@ -208,5 +285,22 @@ mod tests {
         };
         assert_eq!(most(0), "met");
         assert_eq!(most(30), "**missed**");
+    }
+
+    #[test]
+    fn too_many_is_as_wrong_as_too_few() {
+        let off = |hits| {
+            let share = Share { hits, of: 1000 };
+            Headline::share_off_nominal("k", "k", Some(0.08), 0.6827, share)
+        };
+        assert_eq!(off(683).verdict(), "met");
+        assert_eq!(off(560).verdict(), "**missed**");
+        assert_eq!(off(820).verdict(), "**missed**");
+        assert_eq!(off(610).verdict(), "met, interval spans the bar");
+        assert!((off(610).value - 0.0727).abs() < 1e-12 && off(683).low == 0.0);
+        assert_eq!(off(820).better, Better::Lower);
+        let cells = off(820).cells();
+        assert_eq!([&cells[1], &cells[2]], ["68.3 % ± 8.0 %", "82.0 %"]);
+        assert!(cells[3].starts_with("79."), "{}", cells[3]);
     }
 }

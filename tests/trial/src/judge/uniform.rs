@@ -146,7 +146,14 @@ pub fn table(cases: &[Case]) -> Table {
     table
 }
 
-/// The figures for the bars and the ratchet: uniform at the 1 % level, and how many lie below 0.05.
+/// Distance that one uniform sample in a hundred of so many values exceeds: the inverse of [`kolmogorov`].
+fn critical(count: usize) -> f64 {
+    let root = (count as f64).sqrt();
+    1.6276 / (root + 0.12 + 0.11 / root)
+}
+
+/// The figures for the bars and the ratchet: the distance from uniform, with the 1 % level as its bar (the distance's own
+/// p-value is a random number where all is well), and how many lie below 0.05.
 pub fn headlines(cases: &[Case]) -> Vec<Headline> {
     families(cases)
         .into_iter()
@@ -154,14 +161,17 @@ pub fn headlines(cases: &[Case]) -> Vec<Headline> {
         .flat_map(|family| {
             let name = &family.family;
             [
-                Headline::number(
-                    &format!("nulls.uniform_p.{name}"),
-                    &format!("p-values of the null uniform (Kolmogorov, Smirnov), {name}"),
-                    Better::Higher,
-                    Some(0.01),
-                    (family.p, f64::NAN, f64::NAN),
-                    family.values.len(),
-                ),
+                Headline {
+                    step: 1.0 / family.values.len().max(1) as f64,
+                    ..Headline::number(
+                        &format!("nulls.distance.{name}"),
+                        &format!("distance of the null's p-values from uniform, {name}"),
+                        Better::Lower,
+                        Some(critical(family.values.len())),
+                        (family.distance, f64::NAN, f64::NAN),
+                        family.values.len(),
+                    )
+                },
                 Headline::share(
                     &format!("nulls.p_below_0.05.{name}"),
                     &format!("p-values of the null below 0.05, {name}"),
@@ -209,6 +219,9 @@ mod tests {
                 kolmogorov(critical, count)
             );
         }
+        for count in [8, 64, 500] {
+            assert!((kolmogorov(critical(count), count) - 0.01).abs() < 1e-4);
+        }
         // The two forms meet.
         assert!((kolmogorov(0.99999e-4, many) - kolmogorov(1.00001e-4, many)).abs() < 1e-4);
     }
@@ -239,5 +252,9 @@ mod tests {
         assert_eq!(names, ["ideal", "chains", "tone_ring x gps"]);
         assert!(found[0].p > 0.05 && found[1].p < 1e-4);
         assert!(found[1].rejected.value() > 0.15);
+        let told = headlines(&cases);
+        let verdict = |key: &str| told.iter().find(|h| h.key == key).unwrap().verdict();
+        assert!(verdict("nulls.distance.ideal").starts_with("met"));
+        assert!(verdict("nulls.distance.chains").starts_with("**missed**"));
     }
 }
