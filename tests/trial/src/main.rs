@@ -2,12 +2,15 @@
 
 use std::path::PathBuf;
 
-use anyhow::Result;
+use anyhow::{Result, bail};
 use clap::{Args, Parser, Subcommand};
 use sealed_trial::{
     Compensation, Request, ScoreRequest, Tool, Trial, compensation, generate, only_measured, score,
     trial,
 };
+
+/// Seeds from here on are reported on, and not developed against.
+const REPORTED: u64 = 20_000;
 
 /// Conceal effects in recordings, have them diagnosed, and judge.
 #[derive(Parser)]
@@ -102,9 +105,9 @@ enum Command {
         /// The tool under trial.
         #[arg(long, default_value = "target/release/muslip")]
         muslip: PathBuf,
-        /// Seed of every draw.
-        #[arg(long, default_value_t = 20_260)]
-        seed: u64,
+        /// Seed of every draw: 260 unless given, and with --page one from 20,000.
+        #[arg(long)]
+        seed: Option<u64>,
         /// Campaigns of each mechanism.
         #[arg(long, default_value_t = 24)]
         count: usize,
@@ -146,13 +149,13 @@ struct RunArguments {
     /// An earlier engine, tried on every fourth campaign.
     #[arg(long)]
     rival: Option<PathBuf>,
-    /// Commit that the tool was built from.
+    /// Commit that the tool was built from; only with a seed to report.
     #[arg(long)]
     commit: Option<String>,
     /// Scratch directory; a trial that was stopped goes on from what is there.
     #[arg(long, default_value = "target/trial")]
     work: PathBuf,
-    /// Directory of trials.md, trials/ and reality.md; none are written unless given.
+    /// Directory of trials.md, trials/ and reality.md; none are written unless given. The project's own only with --commit.
     #[arg(long)]
     out: Option<PathBuf>,
     /// Directory of measured recordings.
@@ -177,6 +180,11 @@ fn main() -> Result<()> {
             strength,
             real_chain,
         } => {
+            if seed >= REPORTED {
+                bail!(
+                    "seed {seed} is for reports, which `run` makes: a development seed is below 1000"
+                );
+            }
             let requests: Vec<Request> = stratum
                 .into_iter()
                 .map(|stratum| Request {
@@ -230,6 +238,12 @@ fn main() -> Result<()> {
             page,
             all,
         } => {
+            let seed = seed.unwrap_or(260);
+            if page.is_some() != (seed >= REPORTED) {
+                bail!(
+                    "a page is of a seed from {REPORTED}, and such a seed is for a page: seed {seed}"
+                );
+            }
             let report = compensation(&Compensation {
                 muslip,
                 seed,

@@ -33,7 +33,7 @@ pub struct ScoreRequest {
     pub baselines: bool,
     /// Judge the answers of an earlier call instead of calling the tool.
     pub reuse: bool,
-    /// Only every so manieth campaign, by its number, which says nothing of what it conceals.
+    /// Only every n-th campaign, by its number, which says nothing of what it conceals.
     pub every: usize,
 }
 

@@ -23,7 +23,7 @@ pub struct Telling<'a> {
     pub valid: &'a [Case],
     pub void: &'a [Case],
     pub report: &'a Report,
-    /// An earlier engine's cases, on every so manieth campaign.
+    /// An earlier engine's cases, on every n-th campaign.
     pub rival: Option<(usize, &'a [Case])>,
     pub pace: &'a Table,
     /// What people found out about single cases: campaign's number and the cause.
@@ -130,16 +130,22 @@ fn methods(telling: &Telling<'_>) -> Table {
         })
         .cloned()
         .collect();
-    let name = telling
-        .rival
-        .map(|(every, _)| format!("the engine of commit 6b77987, every {every}th campaign"));
-    let others: Vec<(&str, &[Case])> = name
-        .as_deref()
-        .zip(telling.rival)
-        .map(|(name, (_, cases))| (name, cases))
-        .into_iter()
+    let Some((every, earlier)) = telling.rival else {
+        return rivals::baselines(telling.valid, &counts, &[]);
+    };
+    // The tool once more, on what the earlier engine was tried on: another set of files is another test.
+    let same: Vec<Case> = telling
+        .valid
+        .iter()
+        .filter(|case| earlier.iter().any(|other| other.campaign == case.campaign))
+        .cloned()
         .collect();
-    rivals::baselines(telling.valid, &counts, &others)
+    let own = format!("muslip diagnose, every {every}th campaign");
+    let other = format!("the engine of commit 6b77987, every {every}th campaign");
+    let mut table = rivals::baselines(telling.valid, &counts, &[(&own, &same), (&other, earlier)]);
+    table.title =
+        format!("Methods on the same files, an earlier engine on every {every}th campaign of them");
+    table
 }
 
 /// Appends the tables that have rows.
@@ -159,7 +165,7 @@ fn void_table(telling: &Telling<'_>) -> Table {
         let group: Vec<&Case> = telling
             .void
             .iter()
-            .filter(|case| case.forms.contains(&void.form))
+            .filter(|case| void.holds(case))
             .collect();
         let right = group.iter().filter(|case| !case.failed()).count();
         table.row([

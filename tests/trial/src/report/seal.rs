@@ -6,6 +6,8 @@ use std::path::Path;
 
 use anyhow::{Context, Result, bail};
 
+use crate::judge::case::Case;
+
 /// What a seed is for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SeedUse {
@@ -64,7 +66,17 @@ pub struct Void {
     pub why: String,
 }
 
-/// The forms that are void: `form: rule (commit)`, one a line.
+impl Void {
+    /// Whether a case shows it: by a concealed form, by the one effect of a chain, or by a sensor of a real chain.
+    pub fn holds(&self, case: &Case) -> bool {
+        case.forms.contains(&self.form)
+            || case.stratum == "chain" && case.kind == self.form
+            || case.real_chain && [&case.wheel_sensor, &case.vehicle_sensor].contains(&&self.form)
+    }
+}
+
+/// The forms that are void: `form: rule (commit)`, one a line. A form is one of a concealed effect, an effect of the chain
+/// alone, or a sort of sensor.
 pub fn voids() -> Vec<Void> {
     parse(include_str!("../../void.txt"))
 }
@@ -86,6 +98,18 @@ fn parse(text: &str) -> Vec<Void> {
 mod tests {
     use super::*;
     use crate::generate::form::{OUTSIDE, VOCABULARY};
+    use crate::generate::instrument::finding::FINDING_KINDS;
+    use crate::judge::family::toy;
+
+    const SENSORS: [&str; 7] = [
+        "tone_ring",
+        "counts",
+        "tacho",
+        "gps",
+        "optical",
+        "fifth_wheel",
+        "drum_encoder",
+    ];
 
     #[test]
     fn seeds_are_for_one_use() {
@@ -112,12 +136,33 @@ mod tests {
     }
 
     #[test]
+    fn forms_effects_of_a_chain_and_sensors_can_be_void() {
+        let void = |form: &str| Void {
+            form: form.into(),
+            why: String::new(),
+        };
+        let mut chain = toy::case("chain", false);
+        chain.kind = "leaking_column".into();
+        assert!(void("leaking_column").holds(&chain) && !void("ideal").holds(&chain));
+        let mut null = toy::case("null", true);
+        null.kind = "real_chain".into();
+        null.vehicle_sensor = "gps".into();
+        assert!(void("gps").holds(&null));
+        assert!(
+            !void("real_chain").holds(&null),
+            "a sort of null is no form"
+        );
+    }
+
+    #[test]
     fn every_void_form_is_a_form_of_the_generator() {
         let words: Vec<String> = VOCABULARY
             .iter()
             .flat_map(|entry| entry.2.iter())
             .chain(OUTSIDE.iter().map(|entry| &entry.0))
             .filter_map(|form| serde_json::to_value(form).ok()?.as_str().map(str::to_owned))
+            .chain(FINDING_KINDS.into_iter().map(|kind| kind.word()))
+            .chain(SENSORS.iter().map(|word| (*word).to_owned()))
             .collect();
         for void in voids() {
             assert!(words.contains(&void.form), "{} is no form", void.form);

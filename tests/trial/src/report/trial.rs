@@ -52,7 +52,7 @@ pub struct Trial {
 /// Figures that may not get worse, and seeds that were reported on, from the project's root.
 const RATCHET: &str = ".ci/trial.toml";
 const LEDGER: &str = "docs/trials/seeds.txt";
-/// An earlier engine is tried on every so manieth campaign.
+/// An earlier engine is tried on every n-th campaign.
 const RIVAL_EVERY: usize = 4;
 /// The small trial's share of the whole.
 const SMALL: f64 = 0.1;
@@ -140,7 +140,7 @@ fn campaigns(trial: &Trial, directory: &Path) -> Result<String> {
 /// use, or figures of the small trial got worse.
 pub fn trial(trial: &Trial) -> Result<Report> {
     // The tool as it is now: a build that goes on meanwhile must not change it under way.
-    let (tool, program) = frozen(trial)?;
+    let (tool, program) = frozen(&trial.tool, &trial.work)?;
     let trial = &Trial {
         tool,
         ..trial.clone()
@@ -175,12 +175,14 @@ pub fn trial(trial: &Trial) -> Result<Report> {
         .rival
         .as_ref()
         .map(|path| -> Result<Vec<Case>> {
-            let results = answers.with_extension("rival");
             let tool = Tool {
                 path: path.clone(),
                 diagnose_arguments: vec![],
             };
-            Ok(score(&request(tool, results, RIVAL_EVERY))?.cases)
+            let (tool, program) = frozen(&tool, &trial.work)?;
+            let results = directory.join(format!("rival-{}-{}", &hash[..12], &program[..12]));
+            let cases = score(&request(tool, results, RIVAL_EVERY))?.cases;
+            Ok(without_void(&cases, &voids()).0)
         })
         .transpose()?;
     let figures = figures(&valid, &paces, &measured.headlines);
@@ -227,6 +229,17 @@ fn admit(trial: &Trial, program: &str) -> Result<()> {
             trial.seed
         );
     };
+    if trial.commit.is_some() && used != SeedUse::Reported {
+        bail!(
+            "a commit is stated of what is reported, and seed {} is not for that: from 20,000",
+            trial.seed
+        );
+    }
+    if trial.commit.is_none() && trial.pages.as_deref().is_some_and(of_the_project) {
+        bail!(
+            "the project's pages tell of a commit and a reported seed: cargo xtask trial --report --seed N, or --out elsewhere"
+        );
+    }
     match (used, trial.pages.is_some(), trial.small) {
         (SeedUse::Reported, true, false) => {
             let Some(commit) = &trial.commit else {
@@ -247,48 +260,56 @@ fn admit(trial: &Trial, program: &str) -> Result<()> {
     }
 }
 
+/// Whether a directory is that of the project's own pages, or lies in it.
+fn of_the_project(pages: &Path) -> bool {
+    let docs = Path::new("docs");
+    match (fs::canonicalize(pages), fs::canonicalize(docs)) {
+        (Ok(pages), Ok(docs)) => pages.starts_with(docs),
+        _ => pages.strip_prefix(".").unwrap_or(pages).starts_with(docs),
+    }
+}
+
 /// Cases that count, and those of forms that a rule was made for.
 fn without_void(cases: &[Case], voids: &[Void]) -> (Vec<Case>, Vec<Case>) {
-    cases.iter().cloned().partition(|case| {
-        !case
-            .forms
-            .iter()
-            .any(|form| voids.iter().any(|void| &void.form == form))
-    })
+    cases
+        .iter()
+        .cloned()
+        .partition(|case| !voids.iter().any(|void| void.holds(case)))
 }
 
 /// Plays the part with measured recordings alone.
 ///
 /// # Errors
-/// Where a file cannot be written or the tool is missing.
+/// Where a file cannot be written, the tool is missing, or the seed is not for this use.
 pub fn only_measured(trial: &Trial) -> Result<real::Study> {
-    let (tool, program) = frozen(trial)?;
+    let (tool, program) = frozen(&trial.tool, &trial.work)?;
     let trial = Trial {
         tool,
         ..trial.clone()
     };
+    admit(&trial, &program)?;
     let directory = trial.work.join(format!("seed-{}-measured", trial.seed));
     real::study(&trial, &directory, &program[..12])
 }
 
 /// A copy of the tool under its own hash, and the hash.
-fn frozen(trial: &Trial) -> Result<(Tool, String)> {
-    let program = fs::read(&trial.tool.path)
-        .with_context(|| format!("no tool at {}", trial.tool.path.display()))?;
+fn frozen(tool: &Tool, work: &Path) -> Result<(Tool, String)> {
+    let program =
+        fs::read(&tool.path).with_context(|| format!("no tool at {}", tool.path.display()))?;
     let hash = digest([program.as_slice()]);
-    let folder = trial.work.join("tools");
+    let folder = work.join("tools");
     fs::create_dir_all(&folder).with_context(|| format!("cannot make {}", folder.display()))?;
     let path = folder.join(format!("muslip-{}", &hash[..12]));
     if !path.exists() {
         let part = path.with_extension("part");
-        fs::copy(&trial.tool.path, &part)?;
+        fs::copy(&tool.path, &part)?;
         fs::rename(&part, &path)?;
     }
     let path = fs::canonicalize(path)?;
     Ok((
         Tool {
             path,
-            ..trial.tool.clone()
+            ..tool.clone()
         },
         hash,
     ))
@@ -339,8 +360,12 @@ fn introduction(trial: &Trial, hash: &str, program: &str, cases: &[Case]) -> Str
          optical sensor, a fifth wheel or a drum's encoder; filters, coloured noise, hum, steps and drift of the analogue channels; loggers \
          out of step by up to 20 ms and 100 ppm; errors common to both speeds; runs that differ in zero, gain and peak friction. Drawn a \
          campaign, kept over its runs.\n\
-         - False physics: a name that is neither concealed nor true of the measuring chain. A speed channel that is late by more than 1 ms \
-         may be named as such, a load cell's channel that lags the others by more than that as well, an encoder's ripple where the ring has one.\n\
+         - False name: one that is neither concealed nor true of the measuring chain. A speed channel that is late by more than 1 ms \
+         may be named as such, with the right sign, a load cell's channel that lags the others by more than that as well, an encoder's ripple \
+         where the ring has one. A column that reproduces the drag explains nothing.\n\
+         - Delays through a real chain are judged as they show: what is concealed and what the chain adds, against the drag (the drag's own \
+         against the later of both speeds). One delay, lag or ripple before a chain that has its own is judged apart, by the net delay within 20 % \
+         or 2 ms or by the name, and is in no other figure of single effects.\n\
          - Size of an effect: RMS of what it leaves in the residual of its balance, without random noise and after peak friction and \
          critical slip were refitted, in units of that balance's noise (tyre: drag, load and slip noise together; wheel and vehicle: drag \
          and torque noise and that of an acceleration taken over 50 ms); through a real chain, of the chain's random errors. The bars speak of \
@@ -372,8 +397,10 @@ fn introduction(trial: &Trial, hash: &str, program: &str, cases: &[Case]) -> Str
         trial.commit.as_deref().unwrap_or("not stated"),
         if trial.small {
             "--small".to_owned()
-        } else {
+        } else if trial.scale == 1.0 {
             format!("--report --seed {}", trial.seed)
+        } else {
+            format!("--report --seed {} --scale {}", trial.seed, trial.scale)
         },
     )
 }
@@ -406,6 +433,13 @@ mod tests {
     fn seeds_are_kept_to_their_use() {
         let refused = |trial: &Trial| admit(trial, "aa").is_err();
         assert!(!refused(&asked(7, false, true, None)));
+        assert!(refused(&asked(7, false, true, Some("c"))));
+        assert!(refused(&asked(1500, true, false, Some("c"))));
+        for docs in ["docs", "./docs/", "docs/trials"] {
+            let mut into_docs = asked(7, false, true, None);
+            into_docs.pages = Some(PathBuf::from(docs));
+            assert!(refused(&into_docs), "{docs}");
+        }
         assert!(!refused(&asked(1500, true, false, None)));
         assert!(refused(&asked(1500, false, false, None)));
         assert!(refused(&asked(20_300, false, false, None)));
