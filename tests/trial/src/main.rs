@@ -146,7 +146,7 @@ struct RunArguments {
     /// Campaigns as a share of the full trial's 585.
     #[arg(long, default_value_t = 1.0)]
     scale: f64,
-    /// An earlier engine, tried on every fourth campaign.
+    /// An earlier engine, tried on every sixth campaign.
     #[arg(long)]
     rival: Option<PathBuf>,
     /// Commit that the tool was built from; only with a seed to report.

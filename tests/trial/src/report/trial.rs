@@ -53,7 +53,7 @@ pub struct Trial {
 const RATCHET: &str = ".ci/trial.toml";
 const LEDGER: &str = "docs/trials/seeds.txt";
 /// An earlier engine is tried on every n-th campaign.
-const RIVAL_EVERY: usize = 4;
+const RIVAL_EVERY: usize = 6;
 /// The small trial's share of the whole.
 const SMALL: f64 = 0.1;
 
