@@ -1,6 +1,6 @@
 //! The figures of the trial beside their bars: what the diagnosis is judged by.
 
-use crate::judge::case::Case;
+use crate::judge::case::{BAR_STRENGTH, Case};
 use crate::judge::family::{APART, Family};
 use crate::judge::headline::{Better, Headline};
 use crate::judge::tally::{of, shares, strong};
@@ -121,12 +121,16 @@ pub fn figures(cases: &[Case]) -> Vec<Headline> {
     ));
     found.push(Headline::share(
         "timing.chains.right",
-        "one delay, lag or ripple before a chain that has its own: told as it shows",
+        "one delay, lag or ripple from 0.6 sigma before a chain with its own: told as it shows",
         Better::Higher,
         Some(0.90),
-        Share::count(cases.iter().filter_map(|case| case.timing_right), |right| {
-            *right
-        }),
+        Share::count(
+            cases
+                .iter()
+                .filter(|case| case.weakest() >= BAR_STRENGTH)
+                .filter_map(|case| case.timing_right),
+            |right| *right,
+        ),
     ));
     for (family, (first_bar, set_bar)) in APART.into_iter().zip([(0.93, 0.98), (0.90, 0.93)]) {
         let (name, words) = (family.name(), family.words());

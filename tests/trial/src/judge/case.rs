@@ -133,7 +133,9 @@ impl Case {
                 }
                 "outside" => !self.honest || self.variable_right == Some(false),
                 "pair" => self.f1 < 1.0,
-                _ if self.of_the_chain => self.timing_right == Some(false),
+                _ if self.of_the_chain => {
+                    self.weakest() >= BAR_STRENGTH && self.timing_right == Some(false)
+                }
                 _ => self.weakest() >= BAR_STRENGTH && !self.first_right,
             }
             || self
