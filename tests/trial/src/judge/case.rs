@@ -586,7 +586,14 @@ mod tests {
     fn a_delay_is_judged_with_that_of_its_chain() {
         let mut truth = toy::truth("single", "wheel_speed_delay", "delay", 0.03);
         truth.instruments.wheel_late_s = 0.02;
-        truth.instruments.analogue_late_s = 0.005;
+        // One pole in every card: the drag is as late as its time constant.
+        for card in [
+            &mut truth.instruments.drag,
+            &mut truth.instruments.load,
+            &mut truth.instruments.brake,
+        ] {
+            (card.pole_s, card.poles) = (0.005, 1);
+        }
         let named = serde_json::json!({"id": "wheel_speed_delay", "parameters": [{"name": "delay", "value": 0.044, "std": 0.001}]});
         let told = figures(&truth, &[named]);
         assert!((told[0].truth - 0.045).abs() < 1e-12 && (told[0].pull + 1.0).abs() < 1e-9);

@@ -273,7 +273,14 @@ mod tests {
     fn through_a_chain(id: &str) -> Truth {
         let mut truth = toy::truth("single", id, "delay", 0.03);
         truth.instruments.kind = ChainKind::Real;
-        truth.instruments.analogue_late_s = 0.010;
+        // One pole in every card: the drag is as late as its time constant.
+        for card in [
+            &mut truth.instruments.drag,
+            &mut truth.instruments.load,
+            &mut truth.instruments.brake,
+        ] {
+            (card.pole_s, card.poles) = (0.010, 1);
+        }
         truth.instruments.vehicle_late_s = 0.050;
         truth.instruments.wheel_late_s = 0.005;
         truth

@@ -29,7 +29,7 @@ pub struct Trial {
     pub rival: Option<PathBuf>,
     /// Commit that the tool was built from, where it was built from one and nothing else.
     pub commit: Option<String>,
-    /// Seed of every draw; see [`SeedUse`].
+    /// Seed of every draw: below 1000 to develop, 1000 to 1999 for continuous integration, from 20,000 to report.
     pub seed: u64,
     /// A tenth of the campaigns, held against the ratchet.
     pub small: bool,
