@@ -52,6 +52,7 @@ impl Diagnosed {
             count: 1,
             mechanism: mechanism.map(Into::into),
             strength: Some(SIGMA),
+            real_chain: false,
         };
         generate(&scratch.path("."), &[request], SEED).unwrap();
         let runs = recordings(&scratch, "campaign-0000");

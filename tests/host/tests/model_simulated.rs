@@ -433,6 +433,7 @@ fn figures_come_again_whatever_the_model_holds() {
             count: 1,
             mechanism: Some(mechanism.into()),
             strength: Some(3.0),
+            real_chain: false,
         };
         generate(&scratch.path("."), &[request], 5).unwrap();
         let mut runs: Vec<String> = fs::read_dir(scratch.path("campaign-0000"))
