@@ -30,15 +30,18 @@
 
 pub mod ablation;
 pub mod campaign;
+pub mod chain;
 pub mod choose;
 mod cleaning;
 pub mod confidence;
 pub mod data;
+pub mod decide;
 pub mod diagnose;
 pub mod dynamics_remainder;
 pub mod dynamics_stage;
 pub mod fit;
 pub mod imbalance;
+pub mod innovations;
 pub mod lines;
 pub mod locate;
 pub mod looked;

@@ -21,6 +21,9 @@ const LEAST_REACH: f64 = 1.2;
 /// Largest factor by which the windows are widened where slip is noisy.
 pub const MOST_REACH: f64 = 4.0;
 
+/// Reach of the means that leave the slow part of a channel, in s.
+const SLOW_REACH_S: f64 = 0.08;
+
 /// Something wrong with the recording itself.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DataFault {
@@ -47,6 +50,8 @@ pub struct Channel {
     pub smoother: Vec<f64>,
     /// Time derivative of the smoothed channel.
     pub rate: Vec<f64>,
+    /// Its slow part: what a regressor is made of that must not hold the residual's own noise.
+    pub slow: Vec<f64>,
     /// Standard deviation of the white noise in `raw`.
     pub sigma: f64,
     /// Variance of `smooth` as a share of that of `raw`.
@@ -193,14 +198,46 @@ fn channel(
             smoother[k] = sum / total;
         }
     }
+    let slow = mean_about(
+        time,
+        &mean_about(time, &value, segments, SLOW_REACH_S),
+        segments,
+        SLOW_REACH_S,
+    );
     Channel {
         raw,
         smooth: value,
         smoother,
         rate,
+        slow,
         sigma,
         variance_share,
     }
+}
+
+/// Mean over so many seconds on either side, as many samples on one as on the other; the ends keep what they have.
+#[must_use]
+pub fn mean_about(time: &[f64], x: &[f64], segments: &[Range<usize>], reach: f64) -> Vec<f64> {
+    let mut out = x.to_vec();
+    let mut sums = vec![0.0; x.len() + 1];
+    for (k, v) in x.iter().enumerate() {
+        sums[k + 1] = sums[k] + if v.is_finite() { *v } else { 0.0 };
+    }
+    for segment in segments {
+        let Some(last) = segment.clone().last() else {
+            continue;
+        };
+        let span = time[last] - time[segment.start];
+        if !(span > 0.0) {
+            continue;
+        }
+        let samples = (reach * (segment.len() - 1) as f64 / span) as usize;
+        for k in segment.clone() {
+            let half = samples.min(k - segment.start).min(last - k);
+            out[k] = (sums[k + half + 1] - sums[k - half]) / (2 * half + 1) as f64;
+        }
+    }
+    out
 }
 
 /// Prepares one run. `extra_names` fixes the order of the other columns over the campaign, `reach_factor`

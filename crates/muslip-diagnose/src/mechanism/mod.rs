@@ -277,6 +277,8 @@ pub struct State<T> {
     pub opposing: Vec<T>,
     /// Brake torque in N m.
     pub brake: Vec<T>,
+    /// Moment of the rolling resistance on the wheel in N m, where there is one.
+    pub rolling_moment: Option<Vec<T>>,
 }
 
 impl<T: Number> State<T> {
@@ -300,6 +302,7 @@ impl<T: Number> State<T> {
             gain_change: zero,
             opposing: Vec::new(),
             brake: Vec::new(),
+            rolling_moment: None,
         }
     }
 }

@@ -1,0 +1,4 @@
+//! The measuring chain: what is known of it is taken off the recordings before any physics is asked for.
+
+pub mod correct;
+pub mod timing;

@@ -1,0 +1,385 @@
+//! Columns of everything that a linear decision weighs: base law, nuisances of the measuring chain, mechanisms.
+
+use rayon::prelude::*;
+
+use super::gram::Columns;
+use super::noise::Slopes;
+use super::rows::{Rows, rows};
+use crate::data::{Data, Listed, NARROW, WIDTH};
+use crate::mechanism::{Balance, Evidence, Id};
+use crate::model::{Model, Term};
+use crate::number::{Dual, Number};
+
+/// Rows of one run by balance, in the order tyre, wheel, vehicle.
+pub type Triple = [Vec<f64>; 3];
+
+/// A mechanism at one place of its nonlinear parameters.
+#[derive(Clone, Debug)]
+pub struct Candidate {
+    /// Entry of the catalogue.
+    pub entry: usize,
+    /// Its id.
+    pub id: Id,
+    /// Parameters at which the columns were taken.
+    pub start: Vec<f64>,
+    /// Parameters that the columns belong to; empty where the one column is the whole effect at the start.
+    pub free: Vec<usize>,
+    /// First of its columns, counted from the first candidate's, and their number.
+    pub columns: core::ops::Range<usize>,
+}
+
+/// A nuisance of the measuring chain: columns that every model has, with a prior.
+pub struct Nuisance {
+    /// What it is.
+    pub name: &'static str,
+    /// Prior standard deviation of its coefficient, in `unit`.
+    pub std: f64,
+}
+
+/// Everything that enters, by run: `[balance][run][column]`; the residual first, then base, nuisances, candidates.
+pub struct Table {
+    /// Columns by balance and run.
+    pub columns: [Vec<Columns>; 3],
+    /// Columns of the base law.
+    pub base: usize,
+    /// Nuisances, one column each.
+    pub nuisances: Vec<Nuisance>,
+    /// Mechanisms.
+    pub candidates: Vec<Candidate>,
+}
+
+fn values(rows: Rows<f64>) -> Triple {
+    [rows.tyre, rows.wheel, rows.vehicle]
+}
+
+fn plain(data: &Data, model: &Model, run: usize) -> Triple {
+    values(rows(
+        &data.catalogue,
+        model,
+        &model.vector(),
+        &data.series[run],
+        &data.context,
+    ))
+}
+
+/// Derivatives of the rows in the parameters `which` of the model's vector.
+#[must_use]
+pub fn slopes_in(data: &Data, model: &Model, run: usize, which: &[usize]) -> Vec<Triple> {
+    if which.len() <= NARROW {
+        slopes_by::<NARROW>(data, model, run, which)
+    } else {
+        slopes_by::<WIDTH>(data, model, run, which)
+    }
+}
+
+fn slopes_by<const N: usize>(data: &Data, model: &Model, run: usize, which: &[usize]) -> Vec<Triple>
+where
+    Dual<N>: Listed,
+{
+    let p = model.vector();
+    let mut out = Vec::new();
+    for chunk in which.chunks(N) {
+        let dual: Vec<Dual<N>> = p
+            .iter()
+            .enumerate()
+            .map(|(i, v)| {
+                chunk
+                    .iter()
+                    .position(|c| *c == i)
+                    .map_or(Dual::constant(*v), |at| Dual::variable(*v, at))
+            })
+            .collect();
+        let all = rows(
+            &data.catalogue,
+            model,
+            &dual,
+            &data.series[run],
+            &data.context,
+        );
+        for at in 0..chunk.len() {
+            let take = |x: &[Dual<N>]| x.iter().map(|d| d.slope[at]).collect();
+            out.push([take(&all.tyre), take(&all.wheel), take(&all.vehicle)]);
+        }
+    }
+    out
+}
+
+/// Second derivative of a smoothed channel from its rate.
+fn second(rate: &[f64], time: &[f64]) -> Vec<f64> {
+    let n = rate.len();
+    (0..n)
+        .map(|k| {
+            let (a, b) = (k.saturating_sub(2), (k + 2).min(n - 1));
+            let d = (rate[b] - rate[a]) / (time[b] - time[a]).max(1e-9);
+            if d.is_finite() { d } else { 0.0 }
+        })
+        .collect()
+}
+
+/// Columns of the measuring chain's nuisances on one run, with their names and prior sizes.
+fn nuisances(data: &Data, slopes: &Slopes, run: usize, known: bool) -> Vec<(Nuisance, Triple)> {
+    let s = &data.series[run];
+    let n = s.len();
+    let (inertia, mass) = (data.context.inertia, data.context.mass);
+    let finite = |x: f64| if x.is_finite() { x } else { 0.0 };
+    let wheel_rate: Vec<f64> = s.wheel.rate.iter().map(|x| finite(*x)).collect();
+    let speed_rate: Vec<f64> = s.speed.rate.iter().map(|x| finite(*x)).collect();
+    let wheel_second = second(&wheel_rate, &s.time);
+    let speed_second = second(&speed_rate, &s.time);
+    let has = |b: Balance| match b {
+        Balance::Tyre => !s.tyre.is_empty(),
+        Balance::Wheel => s.torque.is_some() && !s.wheel_balance.is_empty(),
+        Balance::Vehicle => !s.vehicle_balance.is_empty(),
+    };
+    let column = |b: Balance, f: &dyn Fn(usize) -> f64| -> Vec<f64> {
+        if has(b) {
+            (0..n).map(|k| finite(f(k))).collect()
+        } else {
+            Vec::new()
+        }
+    };
+    let by_wheel = |u: &dyn Fn(usize) -> f64| -> Triple {
+        [
+            column(Balance::Tyre, &|k| -slopes.wheel[run][k] * u(k)),
+            column(Balance::Wheel, &|k| inertia * u(k)),
+            column(Balance::Vehicle, &|_| 0.0),
+        ]
+    };
+    let by_speed = |u: &dyn Fn(usize) -> f64| -> Triple {
+        [
+            column(Balance::Tyre, &|k| -slopes.speed[run][k] * u(k)),
+            column(Balance::Wheel, &|_| 0.0),
+            column(Balance::Vehicle, &|k| mass * u(k)),
+        ]
+    };
+    let mean = data.context.mean_wheel_speed;
+    // Zero-phase: what inputs and reading differ by in bandwidth, and what smoothing leaves of the slip's noise.
+    let by_force = |reach: f64| -> Triple {
+        let force = &slopes.force[run];
+        let once = crate::prepare::mean_about(&s.time, force, &s.tyre, reach);
+        let twice = crate::prepare::mean_about(&s.time, &once, &s.tyre, reach);
+        [
+            column(Balance::Tyre, &|k| force[k] - twice[k]),
+            column(Balance::Wheel, &|_| 0.0),
+            column(Balance::Vehicle, &|_| 0.0),
+        ]
+    };
+    // The same of brake and drag where they are integrated.
+    let by_integral = |reach: f64, brake: bool| -> Triple {
+        let zero = vec![0.0; n];
+        let (x, segments) = match (&s.torque, brake) {
+            (Some(torque), true) => (&torque.smooth, &s.wheel_balance),
+            (None, true) => (&zero, &s.wheel_balance),
+            _ => (
+                &s.drag_smooth,
+                if s.wheel_balance.is_empty() {
+                    &s.vehicle_balance
+                } else {
+                    &s.wheel_balance
+                },
+            ),
+        };
+        let once = crate::prepare::mean_about(&s.time, x, segments, reach);
+        let twice = crate::prepare::mean_about(&s.time, &once, segments, reach);
+        let mut sum = 0.0;
+        let level: Vec<f64> = (0..n)
+            .map(|k| {
+                let d = (x[k] - twice[k]) * s.dt[k].min(0.1);
+                if d.is_finite() {
+                    sum += d;
+                }
+                sum
+            })
+            .collect();
+        let lever = if brake { 1.0 } else { -data.context.radius };
+        [
+            column(Balance::Tyre, &|_| 0.0),
+            column(Balance::Wheel, &|k| lever * level[k]),
+            column(Balance::Vehicle, &|k| if brake { 0.0 } else { level[k] }),
+        ]
+    };
+    let torque = |k: usize| s.torque.as_ref().map_or(0.0, |t| t.smooth[k]);
+    let _ = known;
+    let nuisance = |name, std| Nuisance { name, std };
+    vec![
+        (
+            nuisance("wheel speed late", 0.02),
+            by_wheel(&|k| wheel_rate[k]),
+        ),
+        (
+            nuisance("vehicle speed late", 0.05),
+            by_speed(&|k| speed_rate[k]),
+        ),
+        (
+            nuisance("brake late", 0.02),
+            [
+                column(Balance::Tyre, &|_| 0.0),
+                column(Balance::Wheel, &torque),
+                column(Balance::Vehicle, &|_| 0.0),
+            ],
+        ),
+        (
+            nuisance("wheel speed late by turn", 0.001),
+            by_wheel(&|k| wheel_rate[k] * mean / s.wheel.smooth[k].abs().max(0.1 * mean)),
+        ),
+        (nuisance("force smoothed, 6 ms", 1.0), by_force(0.006)),
+        (nuisance("force smoothed, 20 ms", 1.0), by_force(0.02)),
+        (nuisance("force smoothed, 60 ms", 0.5), by_force(0.06)),
+        (
+            nuisance("brake smoothed, 6 ms", 1.0),
+            by_integral(0.006, true),
+        ),
+        (
+            nuisance("brake smoothed, 20 ms", 1.0),
+            by_integral(0.02, true),
+        ),
+        (
+            nuisance("drag smoothed, 20 ms", 1.0),
+            by_integral(0.02, false),
+        ),
+        (
+            nuisance("vehicle speed low-passed", 3e-3),
+            by_speed(&|k| -0.5 * speed_second[k]),
+        ),
+        (
+            nuisance("wheel speed low-passed", 3e-4),
+            by_wheel(&|k| -0.5 * wheel_second[k]),
+        ),
+    ]
+}
+
+/// All columns of a campaign about a model.
+#[must_use]
+pub fn table(
+    data: &Data,
+    model: &Model,
+    slopes: &Slopes,
+    evidence: &[Evidence],
+    known: bool,
+    wanted: &dyn Fn(Id) -> bool,
+) -> Table {
+    let runs = data.series.len();
+    let base: Vec<usize> = vec![0, 1];
+    let own: Vec<usize> = (model.base.len()..model.vector().len()).collect();
+    let mut fixed: Vec<usize> = base.clone();
+    fixed.extend(&own);
+    let per_run: Vec<(Vec<Triple>, Vec<(Nuisance, Triple)>)> = (0..runs)
+        .into_par_iter()
+        .map(|run| {
+            let mut all = vec![plain(data, model, run)];
+            all.extend(slopes_in(data, model, run, &fixed));
+            (all, nuisances(data, slopes, run, known))
+        })
+        .collect();
+    let mut columns: [Vec<Columns>; 3] = core::array::from_fn(|_| vec![Vec::new(); runs]);
+    let mut listed = Vec::new();
+    for (run, (fixed, nuisance)) in per_run.into_iter().enumerate() {
+        for triple in fixed.into_iter().chain(nuisance.into_iter().map(|(n, t)| {
+            if run == 0 {
+                listed.push(n);
+            }
+            t
+        })) {
+            for (b, column) in triple.into_iter().enumerate() {
+                columns[b][run].push(column);
+            }
+        }
+    }
+    let entries: Vec<(usize, Vec<f64>)> = data
+        .catalogue
+        .entries()
+        .iter()
+        .enumerate()
+        .filter(|(entry, m)| wanted(m.id()) && !model.terms.iter().any(|t| t.entry == *entry))
+        .flat_map(|(entry, m)| {
+            m.starts(&data.context, &data.series, evidence)
+                .into_iter()
+                .map(move |s| (entry, s))
+        })
+        .collect();
+    let made: Vec<Option<(Vec<usize>, Vec<Vec<Triple>>)>> = entries
+        .par_iter()
+        .map(|(entry, start)| column_of(data, model, *entry, start))
+        .collect();
+    let mut candidates = Vec::new();
+    let mut at = 0;
+    for ((entry, start), made) in entries.into_iter().zip(made) {
+        let Some((free, triples)) = made else {
+            continue;
+        };
+        let width = triples[0].len();
+        for (run, triples) in triples.into_iter().enumerate() {
+            for triple in triples {
+                for (b, column) in triple.into_iter().enumerate() {
+                    columns[b][run].push(column);
+                }
+            }
+        }
+        candidates.push(Candidate {
+            entry,
+            id: data.catalogue.get(entry).id(),
+            start,
+            free,
+            columns: at..at + width,
+        });
+        at += width;
+    }
+    Table {
+        columns,
+        base: fixed.len(),
+        nuisances: listed,
+        candidates,
+    }
+}
+
+/// Columns of one mechanism at one start, by run; `None` where it changes nothing.
+fn column_of(
+    data: &Data,
+    model: &Model,
+    entry: usize,
+    start: &[f64],
+) -> Option<(Vec<usize>, Vec<Vec<Triple>>)> {
+    let mut with = model.clone();
+    with.terms.push(Term {
+        entry,
+        parameters: start.to_vec(),
+    });
+    let first = model.vector().len();
+    let difference: Vec<Triple> = (0..data.series.len())
+        .map(|run| {
+            let (a, b) = (plain(data, &with, run), plain(data, model, run));
+            core::array::from_fn(|i| a[i].iter().zip(&b[i]).map(|(a, b)| a - b).collect())
+        })
+        .collect();
+    let energy = |t: &[Triple]| {
+        t.iter()
+            .flat_map(|t| t.iter().flatten())
+            .filter(|x| x.is_finite())
+            .map(|x| x * x)
+            .sum::<f64>()
+    };
+    if energy(&difference) > 0.0 {
+        return Some((
+            Vec::new(),
+            difference.into_iter().map(|t| vec![t]).collect(),
+        ));
+    }
+    let which: Vec<usize> = (first..first + start.len()).collect();
+    let all: Vec<Vec<Triple>> = (0..data.series.len())
+        .map(|run| slopes_in(data, &with, run, &which))
+        .collect();
+    let free: Vec<usize> = (0..start.len())
+        .filter(|i| {
+            all.iter()
+                .any(|run| run[*i].iter().flatten().any(|x| x.is_finite() && *x != 0.0))
+        })
+        .collect();
+    if free.is_empty() {
+        return None;
+    }
+    let kept = all
+        .into_iter()
+        .map(|run| free.iter().map(|i| run[*i].clone()).collect())
+        .collect();
+    Some((free, kept))
+}

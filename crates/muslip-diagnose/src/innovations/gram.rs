@@ -1,0 +1,133 @@
+//! Inner products of whitened columns, run by run: all that a linear decision needs to know of the samples.
+
+use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
+
+use super::noise::BalanceParts;
+use crate::data::Data;
+
+/// Columns of one run in one balance: the residual first.
+pub type Columns = Vec<Vec<f64>>;
+
+/// Inner products of one run.
+#[derive(Clone, Debug)]
+pub struct Gram {
+    /// Products of all columns with each other; the residual is the first.
+    pub products: DMatrix<f64>,
+    /// Sum of the logarithms of the innovations' variances.
+    pub log_variance: f64,
+    /// Innovations.
+    pub count: usize,
+}
+
+impl Gram {
+    /// Nothing of so many columns.
+    #[must_use]
+    pub fn empty(columns: usize) -> Self {
+        Self {
+            products: DMatrix::zeros(columns, columns),
+            log_variance: 0.0,
+            count: 0,
+        }
+    }
+
+    /// Adds another's.
+    pub fn add(&mut self, other: &Self) {
+        self.products += &other.products;
+        self.log_variance += other.log_variance;
+        self.count += other.count;
+    }
+}
+
+/// Inner products of every run's columns in one balance under its noise, first and second half apart.
+#[must_use]
+pub fn grams(
+    data: &Data,
+    parts: &BalanceParts,
+    columns: &[Columns],
+    stride: usize,
+) -> Vec<[Gram; 2]> {
+    (0..data.series.len())
+        .into_par_iter()
+        .map(|run| gram(data, parts, run, &columns[run], stride))
+        .collect()
+}
+
+fn gram(
+    data: &Data,
+    parts: &BalanceParts,
+    run: usize,
+    columns: &[Vec<f64>],
+    stride: usize,
+) -> [Gram; 2] {
+    let q = columns.len();
+    if q == 0 || columns[0].is_empty() {
+        return [Gram::empty(q), Gram::empty(q)];
+    }
+    let whitener = parts.whitener(data, run, stride);
+    let refs: Vec<&[f64]> = columns.iter().map(|c| c.as_slice()).collect();
+    let white = whitener.apply(&refs);
+    let n = whitener.samples.len();
+    let middle = n / 2;
+    [(0, middle), (middle, n)].map(|(from, to)| {
+        let stacked = DMatrix::from_fn(q, to - from, |i, k| {
+            let v = white[i][from + k];
+            if v.is_finite() { v } else { 0.0 }
+        });
+        let log_variance = whitener.log_variances[from..to].iter().sum();
+        Gram {
+            products: &stacked * stacked.transpose(),
+            log_variance,
+            count: to - from,
+        }
+    })
+}
+
+/// Least squares on inner products with a Gaussian prior on the coefficients.
+pub struct Solved {
+    /// Coefficients of the chosen columns.
+    pub coefficients: DVector<f64>,
+    /// Their covariance.
+    pub covariance: DMatrix<f64>,
+    /// Sum of squares that is left, prior included.
+    pub rss: f64,
+    /// Logarithm of the normal matrix's determinant.
+    pub log_det: f64,
+}
+
+/// Fits the residual (column 0) by the chosen columns; `precision` is the prior's, by column.
+#[must_use]
+pub fn solve(
+    products: &DMatrix<f64>,
+    chosen: &[usize],
+    precision: &dyn Fn(usize) -> f64,
+) -> Option<Solved> {
+    let n = chosen.len();
+    let scale: Vec<f64> = chosen
+        .iter()
+        .map(|&i| (products[(i, i)] + precision(i)).sqrt().max(1e-150))
+        .collect();
+    let a = DMatrix::from_fn(n, n, |i, j| {
+        let prior = if i == j {
+            precision(chosen[i]) + 1e-9 * scale[i] * scale[i]
+        } else {
+            0.0
+        };
+        (products[(chosen[i], chosen[j])] + prior) / (scale[i] * scale[j])
+    });
+    let b = DVector::from_fn(n, |i, _| -products[(chosen[i], 0)] / scale[i]);
+    let cholesky = a.cholesky()?;
+    let x = cholesky.solve(&b);
+    let rss = products[(0, 0)] - b.dot(&x);
+    let inverse = cholesky.inverse();
+    let log_det = 2.0
+        * (0..n)
+            .map(|i| cholesky.l_dirty()[(i, i)].ln() + scale[i].ln())
+            .sum::<f64>();
+    Some(Solved {
+        coefficients: DVector::from_fn(n, |i, _| x[i] / scale[i]),
+        covariance: DMatrix::from_fn(n, n, |i, j| inverse[(i, j)] / (scale[i] * scale[j])),
+        rss,
+        log_det,
+    })
+}

@@ -1,0 +1,10 @@
+//! Residuals of the three balances, their covariance, and the innovations under it.
+
+pub mod candidates;
+pub mod estimate;
+pub mod gram;
+pub mod hypothesis;
+pub mod noise;
+pub mod rows;
+pub mod screen;
+pub mod whiten;

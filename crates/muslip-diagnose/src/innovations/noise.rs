@@ -1,0 +1,356 @@
+//! The noise of the three balances: which parts there are, by what they enter, and how large they start.
+
+use super::whiten::{Kind, Part, Whitener};
+use crate::data::Data;
+use crate::mechanism::Balance;
+
+/// One part of a balance's noise over the campaign.
+#[derive(Clone, Debug)]
+pub struct Source {
+    /// What it is, for a reader.
+    pub name: &'static str,
+    /// How it goes in time; `None` is the readings' own white noise.
+    pub kind: Option<Kind>,
+    /// Gain by run and sample; an empty run where by one.
+    pub gain: Vec<Vec<f64>>,
+    /// Natural logarithm of its standard deviation.
+    pub log_std: f64,
+    /// The same as it starts, from the sensors' own noise.
+    pub log_start: f64,
+    /// The largest that the sensors alone make plausible, on the same scale.
+    pub log_cap: f64,
+}
+
+/// Noise of one balance.
+#[derive(Clone, Debug)]
+pub struct BalanceParts {
+    /// Which.
+    pub balance: Balance,
+    /// Its parts; a walk first where the balance is integrated.
+    pub sources: Vec<Source>,
+}
+
+/// How the force on the base curve changes with what is measured, by run and sample.
+pub struct Slopes {
+    /// N per rad/s of the wheel speed.
+    pub wheel: Vec<Vec<f64>>,
+    /// N per m/s of the vehicle speed.
+    pub speed: Vec<Vec<f64>>,
+    /// Force in N.
+    pub force: Vec<Vec<f64>>,
+    /// N per 1 of slip.
+    pub slip: Vec<Vec<f64>>,
+}
+
+impl Slopes {
+    /// On the base curve with these logarithms of its two parameters.
+    #[must_use]
+    pub fn new(data: &Data, base: &[f64]) -> Self {
+        let (peak, critical) = (base[0].exp(), base[1].exp());
+        let radius = data.context.radius;
+        let mut out = Self {
+            wheel: Vec::new(),
+            speed: Vec::new(),
+            force: Vec::new(),
+            slip: Vec::new(),
+        };
+        for s in &data.series {
+            let mut all = [const { Vec::new() }; 4];
+            for k in 0..s.len() {
+                let (v, omega, load) = (s.speed.smooth[k], s.wheel.smooth[k], s.load.smooth[k]);
+                let x = s.slip(k, radius) / critical;
+                let shape = 1.0 + x * x;
+                let (force, slope) = if s.rolling[k] {
+                    (
+                        load * 2.0 * peak * x / shape,
+                        load * 2.0 * peak / critical * (1.0 - x * x) / (shape * shape),
+                    )
+                } else {
+                    (0.0, 0.0)
+                };
+                let finite = |x: f64| if x.is_finite() { x } else { 0.0 };
+                all[0].push(finite(-slope * radius / v));
+                all[1].push(finite(slope * radius * omega / (v * v)));
+                all[2].push(finite(force));
+                all[3].push(finite(slope));
+            }
+            let [wheel, speed, force, slip] = all;
+            out.wheel.push(wheel);
+            out.speed.push(speed);
+            out.force.push(force);
+            out.slip.push(slip);
+        }
+        out
+    }
+}
+
+fn median(values: impl Iterator<Item = f64>) -> f64 {
+    let mut all: Vec<f64> = values.filter(|v| *v > 0.0).collect();
+    if all.is_empty() {
+        0.0
+    } else {
+        crate::smooth::median_in_place(&mut all)
+    }
+}
+
+/// Integral of a column over a run, and time since its start.
+fn integral(dt: &[f64], x: &[f64]) -> Vec<f64> {
+    let mut sum = 0.0;
+    x.iter()
+        .zip(dt)
+        .enumerate()
+        .map(|(k, (x, dt))| {
+            if k > 0 && x.is_finite() {
+                sum += x * dt.min(0.1);
+            }
+            sum
+        })
+        .collect()
+}
+
+/// The parts of every balance that can be formed, at their starting sizes.
+#[must_use]
+pub fn parts(data: &Data, slopes: &Slopes) -> Vec<BalanceParts> {
+    let s = &data.series;
+    let sigma = |f: &dyn Fn(&crate::prepare::Series) -> f64| median(s.iter().map(f));
+    let dt = data.context.dt;
+    let drag = sigma(&|s| s.drag_sigma).max(1e-6 * data.context.max_drag);
+    let wheel = sigma(&|s| s.wheel.sigma).max(1e-6 * data.context.mean_wheel_speed);
+    let speed = sigma(&|s| s.speed.sigma).max(1e-6 * data.context.mean_speed);
+    let torque = sigma(&|s| s.torque.as_ref().map_or(0.0, |t| t.sigma));
+    let none: Vec<Vec<f64>> = vec![Vec::new(); s.len()];
+    let source = |name, kind, gain: &Vec<Vec<f64>>, std: f64, cap: f64| Source {
+        name,
+        kind,
+        gain: gain.clone(),
+        log_std: std.max(1e-12).ln(),
+        log_start: std.max(1e-12).ln(),
+        log_cap: cap.max(1e-12).ln(),
+    };
+    let friction = 1.0;
+    let (radius, inertia, mass) = (data.context.radius, data.context.inertia, data.context.mass);
+    let force = data.context.max_drag;
+    let time: Vec<Vec<f64>> = s
+        .iter()
+        .map(|s| s.time.iter().map(|t| t - s.time[0]).collect())
+        .collect();
+    let mut all = Vec::new();
+    if s.iter().any(|s| !s.tyre.is_empty()) {
+        all.push(BalanceParts {
+            balance: Balance::Tyre,
+            sources: vec![
+                source("white", None, &none, drag, f64::INFINITY),
+                source(
+                    "wheel speed",
+                    Some(Kind::Forgetting(0.015)),
+                    &slopes.wheel,
+                    0.5 * wheel,
+                    f64::INFINITY,
+                ),
+                source(
+                    "vehicle speed",
+                    Some(Kind::Forgetting(0.2)),
+                    &slopes.speed,
+                    0.3 * speed,
+                    f64::INFINITY,
+                ),
+                source(
+                    "drag, coloured",
+                    Some(Kind::Forgetting(0.07)),
+                    &none,
+                    0.1 * drag,
+                    f64::INFINITY,
+                ),
+                source(
+                    "friction, fast",
+                    Some(Kind::Forgetting(0.03)),
+                    &slopes.force,
+                    0.003 * friction,
+                    f64::INFINITY,
+                ),
+                source(
+                    "friction, slow",
+                    Some(Kind::Forgetting(0.6)),
+                    &slopes.force,
+                    0.001 * friction,
+                    0.003,
+                ),
+                source(
+                    "friction of a run",
+                    Some(Kind::Constant),
+                    &slopes.force,
+                    0.002,
+                    0.005,
+                ),
+                source(
+                    "zero of a run",
+                    Some(Kind::Constant),
+                    &none,
+                    0.1 * drag,
+                    0.002 * force,
+                ),
+                source(
+                    "slip of a run",
+                    Some(Kind::Constant),
+                    &slopes.slip,
+                    1e-4,
+                    5e-4,
+                ),
+            ],
+        });
+    }
+    if s.iter()
+        .any(|s| !s.wheel_balance.is_empty() && s.torque.is_some())
+    {
+        let turned: Vec<Vec<f64>> = s
+            .iter()
+            .map(|s| {
+                s.torque
+                    .as_ref()
+                    .map_or(Vec::new(), |t| integral(&s.dt, &t.smooth))
+            })
+            .collect();
+        let walk = (radius * drag).hypot(torque) * dt.sqrt();
+        let level = inertia * wheel;
+        all.push(BalanceParts {
+            balance: Balance::Wheel,
+            sources: vec![
+                source("walk", Some(Kind::Walk), &none, walk, f64::INFINITY),
+                source("white", None, &none, level, f64::INFINITY),
+                source(
+                    "wheel speed, coloured",
+                    Some(Kind::Forgetting(0.02)),
+                    &none,
+                    0.3 * level,
+                    f64::INFINITY,
+                ),
+                source(
+                    "torque, fast",
+                    Some(Kind::Integrated(0.03)),
+                    &none,
+                    0.2 * walk / dt.sqrt(),
+                    f64::INFINITY,
+                ),
+                source(
+                    "torque, slow",
+                    Some(Kind::Integrated(0.3)),
+                    &none,
+                    0.03 * walk / dt.sqrt(),
+                    0.1 * walk / dt.sqrt(),
+                ),
+                source(
+                    "torque, drifting",
+                    Some(Kind::Integrated(3.0)),
+                    &none,
+                    0.01 * walk / dt.sqrt(),
+                    0.03 * walk / dt.sqrt(),
+                ),
+                source(
+                    "torque's scale of a run",
+                    Some(Kind::Constant),
+                    &turned,
+                    0.002,
+                    0.005,
+                ),
+                source(
+                    "torque's zero of a run",
+                    Some(Kind::Constant),
+                    &time,
+                    0.001 * force * radius,
+                    0.002 * force * radius,
+                ),
+            ],
+        });
+    }
+    if s.iter().any(|s| !s.vehicle_balance.is_empty()) {
+        let impulse: Vec<Vec<f64>> = s.iter().map(|s| integral(&s.dt, &s.drag_smooth)).collect();
+        let walk = drag * dt.sqrt();
+        let level = mass * speed;
+        all.push(BalanceParts {
+            balance: Balance::Vehicle,
+            sources: vec![
+                source("walk", Some(Kind::Walk), &none, walk, f64::INFINITY),
+                source("white", None, &none, level, f64::INFINITY),
+                source(
+                    "vehicle speed, coloured",
+                    Some(Kind::Forgetting(0.2)),
+                    &none,
+                    0.3 * level,
+                    f64::INFINITY,
+                ),
+                source(
+                    "force, slow",
+                    Some(Kind::Integrated(0.3)),
+                    &none,
+                    0.03 * walk / dt.sqrt(),
+                    0.2 * walk / dt.sqrt(),
+                ),
+                source(
+                    "force, drifting",
+                    Some(Kind::Integrated(3.0)),
+                    &none,
+                    0.01 * walk / dt.sqrt(),
+                    0.03 * walk / dt.sqrt(),
+                ),
+                source(
+                    "drag's scale of a run",
+                    Some(Kind::Constant),
+                    &impulse,
+                    0.002,
+                    0.005,
+                ),
+                source(
+                    "force of a run",
+                    Some(Kind::Constant),
+                    &time,
+                    0.001 * force,
+                    0.002 * force,
+                ),
+            ],
+        });
+    }
+    all
+}
+
+impl BalanceParts {
+    /// Usable stretches of a run in this balance.
+    #[must_use]
+    pub fn segments<'a>(&self, data: &'a Data, run: usize) -> &'a [core::ops::Range<usize>] {
+        let s = &data.series[run];
+        match self.balance {
+            Balance::Tyre => &s.tyre,
+            Balance::Wheel => &s.wheel_balance,
+            Balance::Vehicle => &s.vehicle_balance,
+        }
+    }
+
+    /// Gains of the filter on every `stride`-th sample of one run.
+    #[must_use]
+    pub fn whitener(&self, data: &Data, run: usize, stride: usize) -> Whitener {
+        let white: f64 = self
+            .sources
+            .iter()
+            .filter(|s| s.kind.is_none())
+            .map(|s| (2.0 * s.log_std).exp())
+            .sum::<f64>()
+            .sqrt();
+        let parts: Vec<Part<'_>> = self
+            .sources
+            .iter()
+            .filter_map(|s| {
+                Some(Part {
+                    kind: s.kind?,
+                    std: s.log_std.exp(),
+                    gain: &s.gain[run],
+                })
+            })
+            .collect();
+        Whitener::new(
+            &data.series[run].time,
+            self.segments(data, run),
+            stride,
+            &|_| white,
+            &parts,
+        )
+    }
+}

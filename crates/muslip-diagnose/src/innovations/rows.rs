@@ -1,0 +1,131 @@
+//! The three balances of one run as rows, nothing differentiated: the tyre's as a force, the wheel's and the
+//! vehicle's in level (integrated) form.
+//!
+//! tyre e = reading − model of the reading, in N; wheel z = J ω − ∫(R F − T − opposing) dt, in N m s; vehicle
+//! z = m v + ∫(F + opposing) dt, in N s; F is the reading less what the model says that the load cell adds to the
+//! force in the contact. A constant of z means nothing: the whitening takes each stretch's level as unknown.
+
+use crate::data::{Catalogue, Listed};
+use crate::mechanism::{Context, Stage, State};
+use crate::model::{Model, tyre};
+use crate::prepare::Series;
+
+/// Residuals of the three balances on one run, one value a sample; empty where the balance cannot be formed.
+pub struct Rows<T> {
+    /// In N.
+    pub tyre: Vec<T>,
+    /// In N m s.
+    pub wheel: Vec<T>,
+    /// In N s.
+    pub vehicle: Vec<T>,
+}
+
+/// Rows of a model. Terms act on every balance that they touch.
+pub fn rows<T: Listed>(
+    catalogue: &Catalogue,
+    model: &Model,
+    p: &[T],
+    series: &Series,
+    context: &Context,
+) -> Rows<T> {
+    let n = series.len();
+    let zero = T::constant(0.0);
+    let state = tyre(catalogue, model, p, series, context);
+    let chain: Option<Vec<T>> = state
+        .contact
+        .as_ref()
+        .map(|contact| (0..n).map(|k| state.force[k] - contact[k]).collect());
+    let of_chain = |k: usize| chain.as_ref().map_or(zero, |c| c[k]);
+    let wanted = |stage: Stage| {
+        let mut state = State::empty();
+        state.opposing = vec![zero; n];
+        if let Some(torque) = &series.torque {
+            state.brake = torque.smooth.iter().map(|t| T::constant(*t)).collect();
+        }
+        let mut at = model.base.len();
+        for term in &model.terms {
+            let own = &p[at..at + term.parameters.len()];
+            at += term.parameters.len();
+            let mechanism = T::entry(catalogue, term.entry);
+            let both = mechanism.id() == crate::mechanism::Id::ForceGain;
+            if mechanism.stage() == stage || (both && stage == Stage::Wheel) {
+                mechanism.apply(own, series, context, &mut state);
+            }
+        }
+        state
+    };
+    // Deviations from the base are made of what does not hold the residual's own noise, or a parameter could buy
+    // noise by scaling it: the drag's by the model's reading, the speeds' by their slow part.
+    let modelled = |k: usize| {
+        let f = state.force[k].value();
+        if series.rolling[k] && f.is_finite() && !series.tyre.is_empty() {
+            f
+        } else {
+            series.drag_smooth[k]
+        }
+    };
+    let force = |gain: T, k: usize| {
+        (T::constant(1.0) / (gain + 1.0) - 1.0) * (-of_chain(k) + modelled(k))
+            + (-of_chain(k) + series.drag[k])
+    };
+    let integral = |rate: &dyn Fn(usize) -> T, level: &dyn Fn(usize) -> T| -> Vec<T> {
+        let mut sum = zero;
+        let mut before = zero;
+        (0..n)
+            .map(|k| {
+                let now = rate(k);
+                let now = if now.value().is_finite() { now } else { before };
+                if k > 0 {
+                    sum += (now + before) * (0.5 * series.dt[k].min(10.0 * series.typical_dt));
+                }
+                before = now;
+                level(k) + sum
+            })
+            .collect()
+    };
+    let wheel = match (&series.torque, series.wheel_balance.is_empty()) {
+        (Some(torque), false) => {
+            let wheel = wanted(Stage::Wheel);
+            let rolling = state.rolling_moment.as_ref();
+            integral(
+                &|k| {
+                    let brake = wheel.brake[k] + (torque.raw[k] - torque.smooth[k]);
+                    let rolling = rolling.map_or(zero, |r| r[k]);
+                    brake + wheel.opposing[k] + rolling
+                        - force(wheel.gain_change, k) * context.radius
+                },
+                &|k| {
+                    wheel.inertia_change * (context.inertia * series.wheel.slow[k])
+                        + context.inertia * series.wheel.raw[k]
+                },
+            )
+        }
+        _ => Vec::new(),
+    };
+    let vehicle = if series.vehicle_balance.is_empty() {
+        Vec::new()
+    } else {
+        let vehicle = wanted(Stage::Vehicle);
+        // A mass in error scales what slows it: by the model's force, for the speed's own errors are in the level.
+        let lighter = T::constant(1.0) / (vehicle.inertia_change + 1.0) - 1.0;
+        integral(
+            &|k| {
+                let slowing = -of_chain(k) + modelled(k) + vehicle.opposing[k];
+                force(vehicle.gain_change, k) + vehicle.opposing[k] + lighter * slowing
+            },
+            &|k| T::constant(context.mass * series.speed.raw[k]),
+        )
+    };
+    let mut tyre = state.force;
+    if series.tyre.is_empty() {
+        tyre.clear();
+    }
+    for (f, y) in tyre.iter_mut().zip(&series.drag) {
+        *f = -*f + *y;
+    }
+    Rows {
+        tyre,
+        wheel,
+        vehicle,
+    }
+}
