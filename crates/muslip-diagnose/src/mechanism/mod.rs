@@ -27,13 +27,16 @@ mod relaxation_length;
 mod rolling_resistance;
 mod run_out;
 mod slip_hysteresis;
+mod speed_delay;
 mod speed_sensitivity;
 mod structural_resonance;
 mod surface_patch;
 mod thermal_fade;
 mod vehicle_inertia;
+mod vehicle_speed_delay;
 mod wear_drift;
 mod wheel_inertia;
+mod wheel_speed_delay;
 mod zero_drift;
 
 pub use id::{Balance, Id};
@@ -427,5 +430,7 @@ pub fn catalogue<T: Number>() -> Vec<Box<dyn Mechanism<T>>> {
     for form in bearing_drag::FORMS {
         all.push(Box::new(bearing_drag::BearingDrag { form }));
     }
+    all.push(Box::new(vehicle_speed_delay::VehicleSpeedDelay));
+    all.push(Box::new(wheel_speed_delay::WheelSpeedDelay));
     all
 }
