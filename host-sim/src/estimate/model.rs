@@ -6,7 +6,7 @@ use muslip::compensate::{
 };
 use muslip::filter::mu_slip::State;
 use muslip::sample::RigSample;
-use muslip_diagnose::mechanism::{Context, Id};
+use muslip_diagnose::mechanism::{self, Context, Id};
 use muslip_diagnose::repaired::{Repaired, RepairedTerm};
 use serde_json::json;
 
@@ -99,7 +99,7 @@ impl ModelUse {
         for term in &model.dynamics {
             used.mechanisms.push(described(
                 term,
-                Some(Id::parse(&term.id).map_or(UNKNOWN, dynamics)),
+                Some(Id::parse(&term.id).map_or(UNKNOWN, why_not)),
             ));
         }
         for correction in &model.corrections {
@@ -270,26 +270,26 @@ impl ModelUse {
                 once(&mut on.thermal_fade, heat)?;
                 self.holds("temperature_s", 0.0)
             }
-            Id::CurveShape => Err("another law than the filter's two-parameter one"),
-            Id::RunOut | Id::EncoderRipple => Err("needs the wheel's angle, which a sample lacks"),
-            Id::SurfacePatch => Err("a property of the track, not of the tyre"),
-            Id::VehicleSpeedDelay | Id::WheelSpeedDelay => Err(
-                "all other channels would have to wait for the late one, and the filter keeps no line of them",
-            ),
-            Id::RollingResistance
+            Id::CurveShape
+            | Id::RollingResistance
+            | Id::SurfacePatch
             | Id::WearDrift
             | Id::SlipHysteresis
             | Id::StructuralResonance
             | Id::InertialReaction
-            | Id::ForceSaturation => Err("the filter has no compensation for it"),
-            Id::ForceGain
+            | Id::ForceGain
+            | Id::ForceSaturation
+            | Id::RunOut
+            | Id::EncoderRipple
+            | Id::VehicleSpeedDelay
+            | Id::WheelSpeedDelay
             | Id::AeroDrag
             | Id::GradeOrDrive
             | Id::VehicleInertia
             | Id::BearingDrag
             | Id::BrakeFade
             | Id::BrakeLag
-            | Id::WheelInertia => Err(dynamics(id)),
+            | Id::WheelInertia => Err(why_not(id)),
         }
     }
 
@@ -381,12 +381,12 @@ fn described(term: &RepairedTerm, not_compensated: Option<&'static str>) -> Mode
     }
 }
 
-/// Why a mechanism of the wheel and vehicle balances is left alone.
-fn dynamics(id: Id) -> &'static str {
-    if id == Id::ForceGain {
-        "the scale of the drag channel: peak friction is wrong by the same factor"
-    } else {
-        "not of the tyre balance: it does not touch the curve"
+/// Why a mechanism is left alone, as its descriptor says.
+fn why_not(id: Id) -> &'static str {
+    match id.guide().map(|guide| guide.compensation) {
+        Some(mechanism::Compensation::Not(reason)) => reason,
+        // The filter could, but not what stands among the terms of wheel and vehicle.
+        Some(mechanism::Compensation::By(_)) | None => UNKNOWN,
     }
 }
 
