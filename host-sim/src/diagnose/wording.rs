@@ -2,8 +2,8 @@
 
 use muslip_diagnose::mechanism::Id;
 use muslip_diagnose::outcome::{
-    BeforeAfter, Diagnosis, Estimate, Figure, LookedFor, MinimumDetectable, NamedMechanism,
-    Unexplained, Verdict,
+    BeforeAfter, ChainFinding, Diagnosis, Estimate, Figure, LookedFor, MinimumDetectable,
+    NamedMechanism, Unexplained, Verdict,
 };
 
 use crate::wording::{decimals_for, plus_minus};
@@ -268,6 +268,17 @@ pub fn unexplained_sentence(rest: &Unexplained) -> String {
         percent(rest.share),
         sigmas(rest.z),
     )
+}
+
+/// A finding about the measuring chain, in a sentence with its figure.
+#[must_use]
+pub fn chain_sentence(finding: &ChainFinding) -> String {
+    let statement = capitalised(finding.statement.trim_end_matches('.'));
+    let figure = quantity(finding.value, finding.std, &finding.unit);
+    match finding.recording.as_str() {
+        "*" => format!("{statement} ({figure})."),
+        recording => format!("{statement} ({figure}; {}).", short_name(recording)),
+    }
 }
 
 /// How the error of the drag changes; empty where nothing was predicted.

@@ -64,7 +64,7 @@ impl Describe for WheelSpeedDelay {
                     run: "Tap the brake of the wheel at a held vehicle speed, then change the vehicle speed with the wheel rolling freely: each delay shows in the one that moves its own channel.",
                 },
             ],
-            smallest: "a millisecond where the wheel locks in a tenth of a second",
+            smallest: "five milliseconds; one where the wheel locks in a tenth of a second",
             smallest_size: |_| 0.005,
             compensation: Compensation::Not(
                 "all other channels would have to wait for the late one, and the filter keeps no line of them",

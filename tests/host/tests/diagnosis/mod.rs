@@ -10,9 +10,9 @@ use host_sim::simulate::Scenario;
 use muslip_diagnose::campaign::Rig;
 use muslip_diagnose::mechanism::{Before, Context, Id};
 use muslip_diagnose::outcome::{
-    Alternative, BeforeAfter, ChannelNoise, Diagnosis, Estimate, Evidence, Fault, Figure, Fit,
-    Interval, LookedFor, MinimumDetectable, NamedMechanism, Recording, Region, Role, Score, Trace,
-    Unexplained, Verdict,
+    Alternative, BeforeAfter, ChainFinding, ChainWord, ChannelNoise, Diagnosis, Estimate, Evidence,
+    Fault, Figure, Fit, Interval, LookedFor, MinimumDetectable, NamedMechanism, Recording, Region,
+    Role, Score, Trace, Unexplained, Verdict,
 };
 use muslip_diagnose::repaired::{
     Correction, Domain, KnownRecording, NoiseModel, Repaired, RepairedParameter, RepairedTerm,
@@ -400,6 +400,7 @@ pub fn partly_explained() -> Diagnosis {
             end_s: 0.1,
             what: "frozen or clipped".into(),
         }],
+        chain: vec![],
         fit: Fit {
             fit: both,
             holdout: both,
@@ -568,5 +569,44 @@ impl Random {
     pub fn normal(&mut self) -> f64 {
         let radius = (-2.0 * (1.0 - self.uniform()).ln()).sqrt();
         radius * (std::f64::consts::TAU * self.uniform()).cos()
+    }
+}
+
+/// A diagnosis to which the measuring chain's findings are added: for one recording and for all.
+pub fn with_chain(diagnosis: Diagnosis) -> Diagnosis {
+    let finding = |recording: &str, channel: &str, finding, value, std, unit: &str, said: &str| {
+        ChainFinding {
+            recording: recording.into(),
+            channel: channel.into(),
+            relative_to: String::new(),
+            finding,
+            value,
+            std,
+            unit: unit.into(),
+            statement: said.into(),
+        }
+    };
+    Diagnosis {
+        chain: vec![
+            finding(
+                "*",
+                "vehicle_speed_m_s",
+                ChainWord::Late,
+                0.066,
+                0.004,
+                "s",
+                "the vehicle speed comes 66 ms later than the drag",
+            ),
+            finding(
+                "campaign/run02.csv",
+                "wheel_speed_rad_s",
+                ChainWord::ColouredNoise,
+                0.12,
+                f64::NAN,
+                "rad/s",
+                "the wheel speed's noise is correlated over 30 ms",
+            ),
+        ],
+        ..diagnosis
     }
 }
