@@ -1,12 +1,12 @@
 //! `cargo xtask estimators`: the accuracy part of `docs/estimators.md`, and what its peers in Python make of it.
 
 use std::fs;
-use std::process::{Command, Stdio};
+use std::process::Command;
 
-use anyhow::{Context, Result, bail};
+use anyhow::Result;
 
 use crate::figures::replaced_between;
-use crate::step::{cargo, command, root, run};
+use crate::step::{cargo, command, output, root, run};
 
 /// Where the tables are.
 const DOCUMENT: &str = "docs/estimators.md";
@@ -54,18 +54,6 @@ fn example(arguments: &[&str]) -> Command {
     ]);
     command.args(arguments);
     command
-}
-
-/// What a command prints on standard output.
-fn output(mut command: Command) -> Result<String> {
-    let output = command
-        .stderr(Stdio::inherit())
-        .output()
-        .with_context(|| format!("cannot start {command:?}"))?;
-    if !output.status.success() {
-        bail!("{command:?}: {}", output.status);
-    }
-    Ok(String::from_utf8(output.stdout)?)
 }
 
 /// Prints a part of the document and, if asked, puts it between the marks of its name.

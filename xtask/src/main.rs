@@ -7,6 +7,7 @@ mod estimators;
 mod figures;
 mod firmware;
 mod image;
+mod mechanisms;
 mod setup;
 mod step;
 mod test;
@@ -70,6 +71,8 @@ enum Command {
         #[arg(long, value_name = "PYTHON")]
         python: Option<String>,
     },
+    /// Write the field guide, docs/mechanisms.md with its pictures, from what the mechanisms say of themselves.
+    Mechanisms,
     /// Build, check, and put the image onto a chip by probe-rs.
     Flash,
     /// The sealed trial of the diagnosis: conceal effects, diagnose, open, judge, hold against bars.
@@ -111,6 +114,7 @@ fn main() -> anyhow::Result<()> {
             write,
             python,
         } => estimators::run_all(streams, write, python.as_deref()),
+        Command::Mechanisms => mechanisms::write(),
         Command::Flash => firmware::flash(),
         Command::Trial { arguments } => trial::play(&arguments),
     }

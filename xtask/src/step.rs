@@ -55,3 +55,15 @@ pub fn run(name: &str, mut command: Command) -> Result<()> {
         Ok(())
     })
 }
+
+/// What a command prints on standard output.
+pub fn output(mut command: Command) -> Result<String> {
+    let output = command
+        .stderr(Stdio::inherit())
+        .output()
+        .with_context(|| format!("cannot start {command:?}"))?;
+    if !output.status.success() {
+        bail!("{command:?}: {}", output.status);
+    }
+    Ok(String::from_utf8(output.stdout)?)
+}

@@ -149,6 +149,9 @@ pub fn belongs(joint: &Joint<'_>, entry: usize) -> bool {
     if matches!(mechanism.id(), Id::VehicleInertia | Id::ForceGain) && !drag_slows(joint) {
         return false;
     }
+    if matches!(mechanism.id(), Id::VehicleSpeedDelay | Id::WheelSpeedDelay) {
+        return false; // For the audit of the chain to find; this search cannot tell them from a lag.
+    }
     joint.parts.iter().any(|part| match part.balance {
         Balance::Tyre => mechanism.stage() <= Stage::Chain,
         Balance::Wheel => mechanism.stage() == Stage::Wheel || mechanism.id() == Id::ForceGain,

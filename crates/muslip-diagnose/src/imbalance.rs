@@ -34,7 +34,32 @@ impl Against {
             (Id::ForceGain, _) => Self::Drag,
             (Id::BearingDrag, "with_load") => Self::NormalForce,
             (Id::BearingDrag, _) => Self::WheelSpeed,
-            _ => Self::Time,
+            (Id::BrakeFade | Id::BrakeLag, _) => Self::Time,
+            // Of the tyre's balance: none of these is drawn by what wheel or vehicle lack.
+            (
+                Id::CurveShape
+                | Id::LoadSensitivity
+                | Id::SpeedSensitivity
+                | Id::ThermalFade
+                | Id::RelaxationLength
+                | Id::RollingResistance
+                | Id::EffectiveRadius
+                | Id::SurfacePatch
+                | Id::WearDrift
+                | Id::SlipHysteresis
+                | Id::ForceDelay
+                | Id::ForceLag
+                | Id::StructuralResonance
+                | Id::InertialReaction
+                | Id::LoadCrosstalk
+                | Id::ZeroDrift
+                | Id::ForceSaturation
+                | Id::RunOut
+                | Id::EncoderRipple
+                | Id::VehicleSpeedDelay
+                | Id::WheelSpeedDelay,
+                _,
+            ) => Self::Time,
         }
     }
 

@@ -8,6 +8,7 @@ mod completions;
 mod demo;
 mod diagnose;
 mod estimate;
+mod explain;
 mod fit;
 mod paper;
 mod predict;
@@ -50,6 +51,7 @@ enum Command {
     Fit(fit::Arguments),
     Diagnose(diagnose::Arguments),
     Predict(predict::Arguments),
+    Explain(explain::Arguments),
     Simulate(simulate::Arguments),
     Paper(paper::Arguments),
     QuarterCar(quarter_car::Arguments),
@@ -119,6 +121,7 @@ pub fn main() -> ExitCode {
         Command::Fit(arguments) => fit::run(&arguments, &mut terminal),
         Command::Diagnose(arguments) => diagnose::run(&arguments, &mut terminal),
         Command::Predict(arguments) => predict::run(&arguments, &mut terminal),
+        Command::Explain(arguments) => explain::run(&arguments, &mut terminal),
         Command::Simulate(arguments) => simulate::run(&arguments, &mut terminal),
         Command::Paper(arguments) => paper::run(&arguments, &mut terminal),
         Command::QuarterCar(arguments) => quarter_car::run(&arguments, &mut terminal),

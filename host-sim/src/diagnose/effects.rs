@@ -44,13 +44,22 @@ pub fn effects(diagnosis: &Diagnosis, runs: &[Run]) -> Vec<Effect> {
         .dynamics
         .iter()
         .enumerate()
-        .map(|(place, term)| (&term.id, on_balance(diagnosis, runs, place, &term.id)));
+        .map(|(place, term)| (&term.id, on_balance(repaired, runs, place, &term.id)));
     tyre.chain(dynamics)
         .map(|(id, figures)| Effect {
             id: id.clone(),
             figures,
         })
         .collect()
+}
+
+/// The picture of a model's first mechanism on one run; `None` where the run does not show it.
+pub(super) fn of_first(model: &Repaired, run: &Run) -> Option<Figure> {
+    let figures = match model.dynamics.first() {
+        Some(term) => on_balance(model, core::slice::from_ref(run), 0, &term.id),
+        None => on_drag(model, run, 0)?,
+    };
+    figures.into_iter().next()
 }
 
 /// The run with the strongest mismatch of the tyre; the first where none is flagged.
@@ -141,8 +150,8 @@ fn most_shown(time_s: &[f64], values: &[f64]) -> (usize, usize) {
 /// What a mechanism of wheel or vehicle does: what the balance lacks, and what the mechanism supplies, over what
 /// it is a function of. One with a memory is a function of no channel: what it does over time, and how far the
 /// recordings follow it.
-fn on_balance(diagnosis: &Diagnosis, runs: &[Run], place: usize, id: &str) -> Vec<Figure> {
-    let of = |run: &Run| diagnosis.repaired.imbalance(run, place).ok().flatten();
+fn on_balance(repaired: &Repaired, runs: &[Run], place: usize, id: &str) -> Vec<Figure> {
+    let of = |run: &Run| repaired.imbalance(run, place).ok().flatten();
     let shown = runs
         .iter()
         .filter_map(|run| Some((short_name(&run.name), of(run)?)));

@@ -51,6 +51,9 @@ pub fn make_finite(diagnosis: &mut Diagnosis) {
     for fault in &mut diagnosis.data_faults {
         numbers([&mut fault.start_s, &mut fault.end_s]);
     }
+    for finding in &mut diagnosis.chain {
+        value(&mut finding.value, &mut finding.std);
+    }
     let fit = &mut diagnosis.fit;
     for BeforeAfter { before, after } in [&mut fit.fit, &mut fit.holdout] {
         for score in [before, after] {

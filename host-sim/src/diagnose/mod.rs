@@ -1,6 +1,7 @@
 //! `muslip diagnose` and `muslip predict`: files in, engine, files out.
 
 pub mod effects;
+pub mod guide;
 pub mod job;
 pub mod json;
 pub mod load;

@@ -1,5 +1,7 @@
 //! The report of a diagnosis: `report.html`.
 
+use std::collections::BTreeMap;
+
 use muslip_diagnose::mechanism::Id;
 use muslip_diagnose::outcome::{
     Diagnosis, Interval, MinimumDetectable, NamedMechanism, Role, Verdict,
@@ -9,12 +11,12 @@ use muslip_diagnose::repaired::RepairedTerm;
 use super::proof::proof;
 use super::views::Views;
 use super::wording::{
-    NO_BREAK, capitalised, confusable_sentence, least, mechanism_sentence, percent, quantity,
-    quantity_apart, range, short_name, sigmas, significant, spoken, stretch, unexplained_sentence,
-    unseen, variable, verdict_sentence, with_unit,
+    NO_BREAK, capitalised, least, mechanism_sentence, percent, quantity, quantity_apart, range,
+    short_name, sigmas, significant, spoken, stretch, unexplained_sentence, unseen, variable,
+    verdict_sentence, with_unit,
 };
-use super::{effects, plots};
-use crate::report::{Block, KeyFigure, Report, Section, Table, Tone};
+use super::{effects, guide, plots};
+use crate::report::{Block, Cell, KeyFigure, Report, Row, Section, Table, Tone};
 
 /// Most rows of the tables that grow with the recordings.
 const MOST_ROWS: usize = 24;
@@ -25,12 +27,14 @@ const MOST_PARAMETERS: usize = 6;
 #[must_use]
 pub fn report(diagnosis: &Diagnosis, views: &Views, command: &str) -> Report {
     let sections = [
+        chain(diagnosis),
         findings(diagnosis, views),
         comparison(diagnosis),
         proof(diagnosis),
         places(diagnosis, views),
         looked_for(diagnosis),
         data(diagnosis),
+        names(diagnosis),
     ];
     Report {
         title: "Diagnosis".into(),
@@ -137,6 +141,89 @@ pub(super) fn table<const N: usize>(head: [&str; N], rows: Vec<[String; N]>) -> 
     Block::Table(Table::new(head, rows))
 }
 
+/// What the measuring chain does; nothing where nothing was found.
+fn chain(diagnosis: &Diagnosis) -> Section {
+    let rows: Vec<[String; 4]> = diagnosis
+        .chain
+        .iter()
+        .map(|finding| {
+            let recording = match finding.recording.as_str() {
+                "*" => "all",
+                recording => short_name(recording),
+            };
+            [
+                finding.channel.clone(),
+                capitalised(&finding.statement),
+                quantity(finding.value, finding.std, &finding.unit),
+                recording.to_owned(),
+            ]
+        })
+        .collect();
+    if rows.is_empty() {
+        return section("The measuring chain", Vec::new());
+    }
+    let head = ["channel", "what it does", "how much", "recording"];
+    section("The measuring chain", vec![table(head, rows)])
+}
+
+/// Where the page says what a name means.
+fn anchor(id: &str) -> String {
+    format!("explain-{id}")
+}
+
+/// A name that leads to what it means.
+fn linked(id: &str, text: String) -> Cell {
+    Cell {
+        target: Some(format!("#{}", anchor(id))),
+        ..Cell::from(text)
+    }
+}
+
+/// What the names mean: the field guide's sections of all that the page names.
+fn names(diagnosis: &Diagnosis) -> Section {
+    let mut blocks = Vec::new();
+    for &id in Id::ALL {
+        let word = id.as_str();
+        let looked_for = diagnosis.looked_for.iter().any(|entry| entry.id == word);
+        if !looked_for && !diagnosis.mechanisms.iter().any(|named| named.id == word) {
+            continue;
+        }
+        let guide = guide::section(id);
+        blocks.push(Block::Anchored {
+            anchor: anchor(word),
+            text: guide.title,
+        });
+        blocks.push(Block::Paragraph(guide.physics.to_owned()));
+        let rows = guide.rows.into_iter().map(|row| {
+            let text = match row.about {
+                Some(about) => linked(about.as_str(), row.text),
+                None => Cell::from(row.text),
+            };
+            vec![Cell::from(row.label.to_owned()), text]
+        });
+        blocks.push(Block::Folded {
+            summary: "Equation, look-alikes, and what tells them apart".into(),
+            table: of_cells(["", word], rows),
+        });
+    }
+    section("What the names mean", blocks)
+}
+
+/// A table some of whose cells are links.
+fn of_cells<const N: usize>(head: [&str; N], rows: impl IntoIterator<Item = Vec<Cell>>) -> Table {
+    Table {
+        head: head.map(str::to_owned).to_vec(),
+        rows: rows
+            .into_iter()
+            .map(|cells| Row {
+                cells,
+                marked: false,
+            })
+            .collect(),
+        sortable: false,
+    }
+}
+
 fn findings(diagnosis: &Diagnosis, views: &Views) -> Section {
     let mut blocks = Vec::new();
     for mechanism in &diagnosis.mechanisms {
@@ -148,6 +235,10 @@ fn findings(diagnosis: &Diagnosis, views: &Views) -> Section {
             .chain(&diagnosis.repaired.dynamics);
         let term = terms.find(|term| term.id == mechanism.id);
         blocks.push(mechanism_table(mechanism, term));
+        blocks.push(Block::Link {
+            text: format!("What {} is", spoken(mechanism.id)),
+            target: format!("#{}", anchor(mechanism.id)),
+        });
         blocks.extend(
             views
                 .effect(mechanism.id)
@@ -221,19 +312,26 @@ fn mechanism_table(mechanism: &NamedMechanism, term: Option<&RepairedTerm>) -> B
             significant(mechanism.effect_sigma, 2),
         ),
     ]);
-    let confusable = confusable_sentence(mechanism);
-    if !confusable.is_empty() {
-        rows.push(["or".to_owned(), confusable]);
+    let mut rows: Vec<Vec<Cell>> = rows
+        .into_iter()
+        .map(|row| row.map(Cell::from).to_vec())
+        .collect();
+    for other in &mechanism.confusable_with {
+        let text = format!("{} ({})", spoken(other.id), percent(other.confidence));
+        rows.push(vec![
+            Cell::from("could also be".to_owned()),
+            linked(other.id, text),
+        ]);
     }
     if !mechanism.separating_test.trim().is_empty() {
-        rows.push([
-            "to tell apart".to_owned(),
-            capitalised(mechanism.separating_test.trim()),
+        rows.push(vec![
+            Cell::from("to tell apart".to_owned()),
+            Cell::from(capitalised(mechanism.separating_test.trim())),
         ]);
     }
     let name = capitalised(&spoken(mechanism.id));
     let balance = format!("{} balance", mechanism.balance);
-    table([&name, &balance], rows)
+    Block::Table(of_cells([&name, &balance], rows))
 }
 
 fn comparison(diagnosis: &Diagnosis) -> Section {
@@ -397,7 +495,24 @@ fn looked_for(diagnosis: &Diagnosis) -> Section {
         "result",
         "smallest effect that would have been seen",
     ];
-    section("What was looked for", vec![table(head, rows)])
+    let ids: BTreeMap<String, &str> = diagnosis
+        .looked_for
+        .iter()
+        .map(|entry| (spoken(entry.id), entry.id))
+        .collect();
+    let rows = rows.into_iter().map(|row| {
+        let mut cells = row.map(Cell::from).to_vec();
+        if let Some(name) = cells.first_mut()
+            && let Some(id) = ids.get(&name.text)
+        {
+            *name = linked(id, name.text.clone());
+        }
+        cells
+    });
+    section(
+        "What was looked for",
+        vec![Block::Table(of_cells(head, rows))],
+    )
 }
 
 fn data(diagnosis: &Diagnosis) -> Section {

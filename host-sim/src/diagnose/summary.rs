@@ -8,9 +8,9 @@ use crate::input_error::one_line;
 use crate::text::wrapped;
 
 use super::wording::{
-    capitalised, confusable_sentence, either, gain, least, mechanism_sentence, percent, range,
-    short_name, sigmas, significant, spoken, stretch, unexplained_sentence, unseen, variable,
-    verdict_sentence, with_unit,
+    capitalised, chain_sentence, confusable_sentence, either, gain, least, mechanism_sentence,
+    percent, range, short_name, sigmas, significant, spoken, stretch, unexplained_sentence, unseen,
+    variable, verdict_sentence, with_unit,
 };
 
 /// Most lines of a summary.
@@ -43,6 +43,7 @@ pub fn summary(diagnosis: &Diagnosis, out: &Path, width: usize) -> Summary {
     // What is said of every campaign comes first among the caveats, and is least needed here.
     let notes = diagnosis.caveats.iter().rev().cloned().collect();
     let mut sections = [
+        Part::new("Chain", 3, chain(diagnosis), width),
         Part::new("Where", 3, places(diagnosis), width),
         Part::new("What", 9 - verdict.len().max(2), findings(diagnosis), width),
         Part::new("Better", 2, improvement(diagnosis), width),
@@ -51,8 +52,12 @@ pub fn summary(diagnosis: &Diagnosis, out: &Path, width: usize) -> Summary {
         Part::new("Unseen", 3, unnoticed(diagnosis), width),
         Part::new("Note", 2, notes, width),
     ];
+    let explained = explain(diagnosis, width - LABEL);
     // An empty line and the files' come on top.
-    share_out(&mut sections, MOST_LINES - verdict.len() - 2);
+    share_out(
+        &mut sections,
+        MOST_LINES - verdict.len() - 2 - usize::from(explained.is_some()),
+    );
     let mut lines = vec![String::new()];
     for part in sections {
         for (index, text) in part.lines().iter().enumerate() {
@@ -60,6 +65,11 @@ pub fn summary(diagnosis: &Diagnosis, out: &Path, width: usize) -> Summary {
             lines.push(format!("{label:LABEL$}{text}"));
         }
     }
+    lines.extend(
+        explained
+            .iter()
+            .map(|text| format!("{:LABEL$}{text}", "Explain")),
+    );
     lines.push(format!(
         "{:LABEL$}report.html, diagnosis.json and model.toml in {}",
         "Files",
@@ -70,6 +80,26 @@ pub fn summary(diagnosis: &Diagnosis, out: &Path, width: usize) -> Summary {
         good: matches!(diagnosis.verdict, Verdict::Consistent | Verdict::Explained),
         lines,
     }
+}
+
+/// What the measuring chain does.
+fn chain(diagnosis: &Diagnosis) -> Vec<String> {
+    diagnosis.chain.iter().map(chain_sentence).collect()
+}
+
+/// The command that says more of what was named, in a line at most.
+fn explain(diagnosis: &Diagnosis, width: usize) -> Option<String> {
+    let mut command = "muslip explain".to_owned();
+    let mut names = diagnosis.mechanisms.iter().map(|named| named.id);
+    let first = names.next()?;
+    command = format!("{command} {first}");
+    for name in names {
+        if command.contains(name) || command.len() + 1 + name.len() > width {
+            continue;
+        }
+        command = format!("{command} {name}");
+    }
+    Some(command)
 }
 
 /// A labelled part of the summary.
@@ -105,9 +135,16 @@ impl Part {
     }
 }
 
-/// Gives lines that some parts do not need to those that need more, in their order.
+/// Gives lines that some parts do not need to those that need more, in their order; where all together need more
+/// than there are, the longest give theirs up, the last of them first.
 fn share_out(parts: &mut [Part], lines: usize) {
-    let mut spare = lines.saturating_sub(parts.iter().map(|part| part.most).sum());
+    let needed: usize = parts.iter().map(|part| part.most).sum();
+    for _ in lines..needed {
+        if let Some(longest) = parts.iter_mut().max_by_key(|part| part.most) {
+            longest.most = longest.most.saturating_sub(1).max(1);
+        }
+    }
+    let mut spare = lines.saturating_sub(parts.iter().map(|part| part.most).sum::<usize>());
     for part in parts {
         let more = (part.body.len() - part.most).min(spare);
         part.most += more;

@@ -1,8 +1,9 @@
 //! A diagnosis in an engineer's words: the sentences that the terminal and the report share.
 
+use muslip_diagnose::mechanism::Id;
 use muslip_diagnose::outcome::{
-    BeforeAfter, Diagnosis, Estimate, Figure, LookedFor, MinimumDetectable, NamedMechanism,
-    Unexplained, Verdict,
+    BeforeAfter, ChainFinding, Diagnosis, Estimate, Figure, LookedFor, MinimumDetectable,
+    NamedMechanism, Unexplained, Verdict,
 };
 
 use crate::wording::{decimals_for, plus_minus};
@@ -269,6 +270,17 @@ pub fn unexplained_sentence(rest: &Unexplained) -> String {
     )
 }
 
+/// A finding about the measuring chain, in a sentence with its figure.
+#[must_use]
+pub fn chain_sentence(finding: &ChainFinding) -> String {
+    let statement = capitalised(finding.statement.trim_end_matches('.'));
+    let figure = quantity(finding.value, finding.std, &finding.unit);
+    match finding.recording.as_str() {
+        "*" => format!("{statement} ({figure})."),
+        recording => format!("{statement} ({figure}; {}).", short_name(recording)),
+    }
+}
+
 /// How the error of the drag changes; empty where nothing was predicted.
 #[must_use]
 pub fn gain(score: &BeforeAfter) -> String {
@@ -318,31 +330,12 @@ pub fn unseen(diagnosis: &Diagnosis) -> (Vec<&LookedFor>, Vec<(&LookedFor, &Mini
     (hidden, visible)
 }
 
-/// Size of a mechanism's first figure from which an engineer cares: it changes the drag by some percent
-/// of itself, or the reading by the noise of a sample. Only the order of a list hangs on it.
+/// Size of a mechanism's first figure from which an engineer cares. Only the order of a list hangs on it.
 fn matters_from(diagnosis: &Diagnosis, id: &str) -> f64 {
-    let rig = &diagnosis.repaired.rig;
-    let context = &diagnosis.repaired.context;
-    let noise = diagnosis.noise.get("drag_force_n").map_or(1.0, |n| n.sigma);
-    let drag = context.max_drag.max(noise);
-    let size = match id {
-        "curve_shape" | "load_sensitivity" => 0.1,
-        "speed_sensitivity" => 0.05 / context.mean_speed.max(0.1),
-        "relaxation_length" => 0.3 * rig.radius_m,
-        "rolling_resistance" | "load_crosstalk" | "effective_radius" => 0.01,
-        "surface_patch" | "wear_drift" | "slip_hysteresis" | "force_gain" | "run_out" => 0.03,
-        "force_delay" | "force_lag" | "brake_lag" => 0.005,
-        "structural_resonance" => 30.0,
-        "inertial_reaction" => rig.wheel_inertia_kg_m2 / rig.radius_m.max(0.005) * 0.1,
-        "zero_drift" => noise,
-        "encoder_ripple" => 0.003,
-        "aero_drag" => 0.03 * drag / context.max_speed.max(0.1).powi(2),
-        "grade_or_drive" => 0.03 * drag,
-        "vehicle_inertia" => 0.03 * rig.mass_kg,
-        "bearing_drag" => 0.03 * drag * rig.radius_m,
-        "wheel_inertia" => 0.1 * rig.wheel_inertia_kg_m2,
-        _ => 0.05,
-    };
+    let guide = Id::parse(id).and_then(Id::guide);
+    let size = guide.map_or(0.0, |guide| {
+        (guide.smallest_size)(&diagnosis.repaired.context)
+    });
     if size > 0.0 { size } else { 1.0 }
 }
 

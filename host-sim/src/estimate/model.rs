@@ -6,12 +6,14 @@ use muslip::compensate::{
 };
 use muslip::filter::mu_slip::State;
 use muslip::sample::RigSample;
-use muslip_diagnose::mechanism::Context;
+use muslip_diagnose::mechanism::{self, Context, Id};
 use muslip_diagnose::repaired::{Repaired, RepairedTerm};
 use serde_json::json;
 
 use crate::measure::Survey;
 
+/// Why a mechanism that is not of the vocabulary is left alone.
+const UNKNOWN: &str = "a mechanism that this program does not know";
 /// Shortest time without a sample, in s, that counts as a gap, ...
 const SHORTEST_GAP_S: f64 = 0.1;
 /// ... and how many usual steps it must be at least.
@@ -95,8 +97,10 @@ impl ModelUse {
             used.mechanisms.push(described(term, outcome.err()));
         }
         for term in &model.dynamics {
-            used.mechanisms
-                .push(described(term, Some(dynamics(&term.id))));
+            used.mechanisms.push(described(
+                term,
+                Some(Id::parse(&term.id).map_or(UNKNOWN, why_not)),
+            ));
         }
         for correction in &model.corrections {
             used.mechanisms.push(ModelledMechanism {
@@ -128,8 +132,9 @@ impl ModelUse {
         let mean_speed = context.mean_speed;
         let form = term.form.as_str();
         let on = &mut self.compensation;
-        match term.id.as_str() {
-            "effective_radius" => {
+        let id = Id::parse(&term.id).ok_or(UNKNOWN)?;
+        match id {
+            Id::EffectiveRadius => {
                 let relative_error = value(0)?;
                 let radius = match form {
                     "constant" => EffectiveRadius::Constant { relative_error },
@@ -147,20 +152,20 @@ impl ModelUse {
                 };
                 once(&mut on.effective_radius, radius)
             }
-            "force_delay" => once(
+            Id::ForceDelay => once(
                 &mut on.force_delay,
                 ForceDelay {
                     delay_s: value(0)?,
                     sampling_step_s: survey.mean_step_s.min(context.dt),
                 },
             ),
-            "force_lag" => once(
+            Id::ForceLag => once(
                 &mut on.force_lag,
                 ForceLag {
                     time_constant_s: value(0)?,
                 },
             ),
-            "zero_drift" => {
+            Id::ZeroDrift => {
                 let start_s = if form.ends_with("through_runs") {
                     run.time_before_s
                 } else {
@@ -186,11 +191,11 @@ impl ModelUse {
                 };
                 once(&mut on.zero_drift, drift)
             }
-            "load_crosstalk" => {
+            Id::LoadCrosstalk => {
                 let share = value(0)?;
                 once(&mut on.load_crosstalk, LoadCrosstalk { share })
             }
-            "load_sensitivity" => {
+            Id::LoadSensitivity => {
                 let critical_slip_exponent = match form {
                     "peak" => 0.0,
                     "peak_and_critical_slip" => value(1)?,
@@ -204,7 +209,7 @@ impl ModelUse {
                 once(&mut on.load_sensitivity, load)?;
                 self.holds("normal_force_n", mean_load)
             }
-            "speed_sensitivity" => {
+            Id::SpeedSensitivity => {
                 let per_m_s = value(0)?;
                 let mean_vehicle_speed_m_s = mean_speed;
                 let (speed, at) = match form {
@@ -241,7 +246,7 @@ impl ModelUse {
                     None => self.holds("sliding_speed_m_s", 0.0),
                 }
             }
-            "relaxation_length" => {
+            Id::RelaxationLength => {
                 let length_m = value(0)?;
                 let relaxation = match form {
                     "slip" => Relaxation::Slip { length_m },
@@ -250,7 +255,7 @@ impl ModelUse {
                 };
                 once(&mut on.relaxation, relaxation)
             }
-            "thermal_fade" => {
+            Id::ThermalFade => {
                 let curvature_per_s2 = match form {
                     "linear" => 0.0,
                     "curved" => value(2)?,
@@ -265,10 +270,26 @@ impl ModelUse {
                 once(&mut on.thermal_fade, heat)?;
                 self.holds("temperature_s", 0.0)
             }
-            "curve_shape" => Err("another law than the filter's two-parameter one"),
-            "run_out" | "encoder_ripple" => Err("needs the wheel's angle, which a sample lacks"),
-            "surface_patch" => Err("a property of the track, not of the tyre"),
-            _ => Err("the filter has no compensation for it"),
+            Id::CurveShape
+            | Id::RollingResistance
+            | Id::SurfacePatch
+            | Id::WearDrift
+            | Id::SlipHysteresis
+            | Id::StructuralResonance
+            | Id::InertialReaction
+            | Id::ForceGain
+            | Id::ForceSaturation
+            | Id::RunOut
+            | Id::EncoderRipple
+            | Id::VehicleSpeedDelay
+            | Id::WheelSpeedDelay
+            | Id::AeroDrag
+            | Id::GradeOrDrive
+            | Id::VehicleInertia
+            | Id::BearingDrag
+            | Id::BrakeFade
+            | Id::BrakeLag
+            | Id::WheelInertia => Err(why_not(id)),
         }
     }
 
@@ -360,11 +381,12 @@ fn described(term: &RepairedTerm, not_compensated: Option<&'static str>) -> Mode
     }
 }
 
-/// Why a mechanism of the wheel and vehicle balances is left alone.
-fn dynamics(id: &str) -> &'static str {
-    match id {
-        "force_gain" => "the scale of the drag channel: peak friction is wrong by the same factor",
-        _ => "not of the tyre balance: it does not touch the curve",
+/// Why a mechanism is left alone, as its descriptor says.
+fn why_not(id: Id) -> &'static str {
+    match id.guide().map(|guide| guide.compensation) {
+        Some(mechanism::Compensation::Not(reason)) => reason,
+        // The filter could, but not what stands among the terms of wheel and vehicle.
+        Some(mechanism::Compensation::By(_)) | None => UNKNOWN,
     }
 }
 

@@ -67,6 +67,13 @@ pub struct Section {
 pub enum Block {
     /// A heading within the section.
     Heading(String),
+    /// The same, which a link may lead to.
+    Anchored {
+        /// What a link calls it, after the `#`.
+        anchor: String,
+        /// What it says.
+        text: String,
+    },
     /// Text.
     Paragraph(String),
     /// A table.
@@ -82,11 +89,11 @@ pub enum Block {
     Figure(Figure),
     /// A filter's run, frame by frame, at the reader's pace; one a page.
     Convergence(Box<Convergence>),
-    /// A link to a file beside the page.
+    /// A link to a file beside the page, or to a heading on it.
     Link {
         /// What the reader sees.
         text: String,
-        /// The file, relative to the page.
+        /// The file, relative to the page; `#` and the heading's anchor.
         target: String,
     },
 }
@@ -138,6 +145,10 @@ struct DrawnSection<'a> {
 
 enum DrawnBlock<'a> {
     Heading(&'a str),
+    Anchored {
+        anchor: &'a str,
+        text: &'a str,
+    },
     Paragraph(String),
     Table(DrawnTable<'a>),
     Folded {
@@ -359,6 +370,7 @@ fn drawn<'a>(section: &'a Section, data: &mut PageData) -> DrawnSection<'a> {
     for block in &section.blocks {
         let next = match block {
             Block::Heading(text) => DrawnBlock::Heading(text),
+            Block::Anchored { anchor, text } => DrawnBlock::Anchored { anchor, text },
             Block::Paragraph(text) => DrawnBlock::Paragraph(typeset(text)),
             Block::Table(table) => DrawnBlock::Table(data.table(heading, table)),
             Block::Folded { summary, table } => DrawnBlock::Folded {

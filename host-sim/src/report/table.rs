@@ -27,7 +27,7 @@ pub struct Cell {
     pub text: String,
     /// What it is sorted by, where that is not the text.
     pub key: Option<f64>,
-    /// A file that it links to, relative to the page.
+    /// A file that it links to, relative to the page; `#` and the anchor of a heading on it.
     pub target: Option<String>,
 }
 

@@ -4,7 +4,7 @@ mod diagnosis;
 
 use std::path::Path;
 
-use diagnosis::{assert_valid, consistent, monstrous, partly_explained};
+use diagnosis::{assert_valid, consistent, monstrous, partly_explained, with_chain};
 use host_sim::diagnose::model_file::ModelFile;
 use host_sim::diagnose::summary::{MOST_LINES, WIDEST_LINE, summary};
 use host_sim::diagnose::views::Views;
@@ -155,7 +155,8 @@ fn the_report_shows_every_part_and_without_plots_runs_no_script() {
         "Data",
         "Force lag",
         "time_constant * d(reading)/dt + reading = drag",
-        "Could also be relaxation length",
+        "could also be",
+        ">relaxation length (5",
         "Repeat at half and at twice the speed",
         "depends on vehicle speed",
         "held-out data, repaired model",
@@ -242,4 +243,45 @@ fn read_all(folder: &Path) -> Vec<(String, String)> {
         .collect();
     files.sort();
     files
+}
+
+#[test]
+fn the_chain_s_findings_come_before_the_physics_and_only_where_there_are_some() {
+    let mut diagnosis = with_chain(partly_explained());
+    json::make_finite(&mut diagnosis);
+    assert_valid(&json::to_text(&diagnosis).unwrap());
+    let told = told(&diagnosis);
+    let place =
+        |text: &str, part: &str| text.find(part).unwrap_or_else(|| panic!("{part}: {text}"));
+    assert!(place(&told, "The vehicle speed comes 66 ms later") < place(&told, "Where "));
+    assert!(
+        told.contains("Explain  muslip explain force_lag wheel_inertia\n"),
+        "{told}"
+    );
+    assert!(told.lines().count() <= MOST_LINES);
+    let html = |diagnosis: &Diagnosis| {
+        page::report(diagnosis, &Views::default(), "")
+            .to_html()
+            .unwrap()
+    };
+    let page = html(&diagnosis);
+    assert!(place(&page, "The measuring chain") < place(&page, "What is missing"));
+    assert!(!html(&partly_explained()).contains("The measuring chain"));
+    let nothing = summary(&consistent(), Path::new("found"), WIDEST_LINE);
+    assert!(!nothing.lines.join("\n").contains("Explain"));
+}
+
+#[test]
+fn every_name_of_the_report_leads_to_what_it_means() {
+    let page = page::report(&partly_explained(), &Views::default(), "")
+        .to_html()
+        .unwrap();
+    let mut links = 0;
+    for link in page.split("href=\"#").skip(1) {
+        let target = link.split('"').next().unwrap();
+        assert!(page.contains(&format!("id=\"{target}\"")), "{target}");
+        links += 1;
+    }
+    // At least each of those looked for, and what was named.
+    assert!(links > muslip_diagnose::mechanism::Id::ALL.len(), "{links}");
 }

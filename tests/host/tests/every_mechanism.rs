@@ -282,6 +282,8 @@ fn there_is_a_campaign_for_every_mechanism_of_the_vocabulary() {
         .collect();
     concealed.sort_unstable();
     known.sort_unstable();
+    // A delay of a speed channel is for the audit of the measuring chain; what names mechanisms leaves it alone.
+    known.retain(|id| !["vehicle_speed_delay", "wheel_speed_delay"].contains(id));
     assert_eq!(concealed, known);
 }
 
@@ -317,6 +319,6 @@ fn where_nothing_is_concealed_nothing_is_found() {
             "{said}"
         );
     }
-    assert_eq!(ids(&diagnosed.answer["looked_for"]).len(), NAMED.len());
+    assert_eq!(ids(&diagnosed.answer["looked_for"]).len(), NAMED.len() + 2);
     diagnosed.assert_predicts(Predicts::Alike);
 }

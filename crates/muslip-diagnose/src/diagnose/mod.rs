@@ -196,6 +196,8 @@ impl Outcome<'_> {
             unexplained,
             looked_for: looked,
             data_faults: self.faults(),
+            // The audit of the chain is yet to fill it.
+            chain: Vec::new(),
             fit: self.scores(),
             caveats: self.caveats(),
             traces: self.traces(),

@@ -1,6 +1,9 @@
 //! A deceleration that grows with speed squared and is not tyre drag.
 
-use super::{Context, Describe, Evidence, Id, Law, Mechanism, Parameter, Reported, Stage, State};
+use super::{
+    Alias, Balance, Compensation, Context, Describe, Evidence, Example, Guide, Id, Kind, Law,
+    Mechanism, Memory, Parameter, Reported, Sign, Stage, State,
+};
 use crate::number::Number;
 use crate::prepare::Series;
 
@@ -35,6 +38,40 @@ impl Describe for AeroDrag {
             "a drag of {:.4} N per (m/s)^2 slows the vehicle beside the tyre",
             reported[0].value
         )
+    }
+    fn guide(&self) -> Guide {
+        Guide {
+            physics: "The air slows the vehicle by a force that grows with the square of its speed, beside the tyre. It shows at high speed with the brake released.",
+            kind: Kind::Vehicle,
+            touches: &[Balance::Vehicle],
+            memory: Memory::None,
+            sign: Sign::Positive,
+            aliases: &[
+                Alias {
+                    with: Id::GradeOrDrive,
+                    why: "In a narrow range of speed its square is a constant.",
+                    run: "Coast down unbraked from the highest speed, in both directions of the track.",
+                },
+                Alias {
+                    with: Id::VehicleInertia,
+                    why: "Where all stops begin at one speed, deceleration goes with it.",
+                    run: "Coast down unbraked from the highest speed, in both directions of the track.",
+                },
+                Alias {
+                    with: Id::ForceGain,
+                    why: "Where all stops begin at one speed, drag goes with it.",
+                    run: "Coast down unbraked from the highest speed, in both directions of the track.",
+                },
+            ],
+            smallest: "three percent of the largest drag at the largest speed",
+            smallest_size: |c| 0.03 * c.max_drag.max(c.drag_sigma) / c.max_speed.max(0.1).powi(2),
+            compensation: Compensation::Not("not of the tyre balance: it does not touch the curve"),
+            carried: "as it is, from the fresh run's own speed",
+            example: Example {
+                form: "",
+                parameters: &[0.8],
+            },
+        }
     }
 }
 

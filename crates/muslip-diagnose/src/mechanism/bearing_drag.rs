@@ -1,6 +1,9 @@
 //! A torque that opposes rotation, beside brake and tyre.
 
-use super::{Context, Describe, Evidence, Id, Law, Mechanism, Parameter, Reported, Stage, State};
+use super::{
+    Alias, Balance, Compensation, Context, Describe, Evidence, Example, Guide, Id, Kind, Law,
+    Mechanism, Memory, Parameter, Reported, Sign, Stage, State,
+};
 use crate::number::Number;
 use crate::prepare::Series;
 
@@ -80,6 +83,28 @@ impl Describe for BearingDrag {
             "a torque of {:.2} N m opposes the wheel's rotation beside brake and tyre",
             reported[0].value
         )
+    }
+    fn guide(&self) -> Guide {
+        Guide {
+            physics: "Bearings, seals and a gear drag on the wheel beside brake and tyre, with a torque that may grow with speed or load. The wheel slows with the brake released.",
+            kind: Kind::Wheel,
+            touches: &[Balance::Wheel],
+            memory: Memory::None,
+            sign: Sign::Positive,
+            aliases: &[Alias {
+                with: Id::WheelInertia,
+                why: "Where the wheel always slows at one rate, an inertia is a torque.",
+                run: "Spin the lifted wheel up and apply the brake in steps, cold and hot: inertia and bearing show in the coast-down, lag and fade in the stops.",
+            }],
+            smallest: "three percent of the largest drag at the radius",
+            smallest_size: |c| 0.03 * c.max_drag.max(c.drag_sigma) * c.radius,
+            compensation: Compensation::Not("not of the tyre balance: it does not touch the curve"),
+            carried: "as it is, from the fresh run's own speed and load",
+            example: Example {
+                form: "constant",
+                parameters: &[40.0],
+            },
+        }
     }
 }
 

@@ -1,6 +1,9 @@
 //! Torque per pressure falls with brake temperature.
 
-use super::{Context, Describe, Evidence, Id, Law, Mechanism, Parameter, Reported, Stage, State};
+use super::{
+    Alias, Balance, Compensation, Context, Describe, Evidence, Example, Guide, Id, Kind, Law,
+    Mechanism, Memory, Parameter, Reported, Sign, Stage, State,
+};
 use crate::number::Number;
 use crate::prepare::Series;
 
@@ -66,6 +69,45 @@ impl Describe for BrakeFade {
             "brake torque per pressure falls by up to {:.1} % as the brake heats",
             100.0 * reported[0].value
         )
+    }
+    fn guide(&self) -> Guide {
+        Guide {
+            physics: "Pads lose friction as the brake heats, so the same pressure gives less torque late in an application. It recovers as the brake cools.",
+            kind: Kind::Wheel,
+            touches: &[Balance::Wheel],
+            memory: Memory::Run,
+            sign: Sign::Positive,
+            aliases: &[
+                Alias {
+                    with: Id::BrakeLag,
+                    why: "Both take torque from a rising pressure.",
+                    run: "Spin the lifted wheel up and apply the brake in steps, cold and hot: inertia and bearing show in the coast-down, lag and fade in the stops.",
+                },
+                Alias {
+                    with: Id::WheelInertia,
+                    why: "Torque that is missing and inertia that is too small slow the wheel alike.",
+                    run: "Spin the lifted wheel up and apply the brake in steps, cold and hot: inertia and bearing show in the coast-down, lag and fade in the stops.",
+                },
+                Alias {
+                    with: Id::BearingDrag,
+                    why: "Torque that fades is a torque of the other sign beside the brake.",
+                    run: "Spin the lifted wheel up and apply the brake in steps, cold and hot: inertia and bearing show in the coast-down, lag and fade in the stops.",
+                },
+                Alias {
+                    with: Id::ForceGain,
+                    why: "The wheel's balance weighs torque against drag: either scale may be wrong.",
+                    run: "Spin the lifted wheel up and apply the brake in steps, cold and hot: inertia and bearing show in the coast-down, lag and fade in the stops.",
+                },
+            ],
+            smallest: "five percent of the torque",
+            smallest_size: |_| 0.05,
+            compensation: Compensation::Not("not of the tyre balance: it does not touch the curve"),
+            carried: "starts cold in every run; heated by the fresh run's own brake power",
+            example: Example {
+                form: "",
+                parameters: &[0.1, 3.0],
+            },
+        }
     }
 }
 

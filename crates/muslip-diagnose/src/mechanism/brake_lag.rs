@@ -1,7 +1,10 @@
 //! Brake torque follows pressure with a lag.
 
 use super::filters::first_order;
-use super::{Context, Describe, Evidence, Id, Law, Mechanism, Parameter, Reported, Stage, State};
+use super::{
+    Alias, Balance, Compensation, Context, Describe, Evidence, Example, Guide, Id, Kind, Law,
+    Mechanism, Memory, Parameter, Reported, Sign, Stage, State,
+};
 use crate::number::Number;
 use crate::prepare::Series;
 
@@ -43,6 +46,35 @@ impl Describe for BrakeLag {
             "brake torque follows the commanded torque with a time constant of {:.1} ms",
             1e3 * reported[0].value
         )
+    }
+    fn guide(&self) -> Guide {
+        Guide {
+            physics: "Fluid, hoses and calliper must move before the pads press, so torque follows the pressure with a lag. It shows where the pressure steps.",
+            kind: Kind::Wheel,
+            touches: &[Balance::Wheel],
+            memory: Memory::Kernel,
+            sign: Sign::Positive,
+            aliases: &[
+                Alias {
+                    with: Id::WheelInertia,
+                    why: "Both delay how the wheel answers a step.",
+                    run: "Spin the lifted wheel up and apply the brake in steps, cold and hot: inertia and bearing show in the coast-down, lag and fade in the stops.",
+                },
+                Alias {
+                    with: Id::BearingDrag,
+                    why: "On ramps a lag is a constant torque that is missing.",
+                    run: "Spin the lifted wheel up and apply the brake in steps, cold and hot: inertia and bearing show in the coast-down, lag and fade in the stops.",
+                },
+            ],
+            smallest: "five milliseconds; one to two are within the bias of ideal sensors",
+            smallest_size: |_| 0.005,
+            compensation: Compensation::Not("not of the tyre balance: it does not touch the curve"),
+            carried: "as it is: settled at the run's first sample",
+            example: Example {
+                form: "",
+                parameters: &[0.03],
+            },
+        }
     }
 }
 

@@ -1,6 +1,9 @@
 //! The sharpness of the peak or the friction of the full skid is not that of the two-parameter law.
 
-use super::{Context, Describe, Evidence, Id, Law, Mechanism, Parameter, Reported, Stage, State};
+use super::{
+    Alias, Balance, Compensation, Context, Describe, Evidence, Example, Guide, Id, Kind, Law,
+    Mechanism, Memory, Parameter, Reported, Sign, Stage, State,
+};
 use crate::number::Number;
 use crate::prepare::Series;
 
@@ -67,6 +70,28 @@ impl Describe for CurveShape {
             "the curve has another shape: at full skid {:.2} of the peak friction is left",
             reported[0].value
         )
+    }
+    fn guide(&self) -> Guide {
+        Guide {
+            physics: "The tread's contact patch slides from its rear edge forward as slip grows, and how fast it does so, and how much grip a sliding block keeps, is not the same in every tyre. The peak is then sharper or blunter, and the full skid higher or lower, than the two-parameter law has it.",
+            kind: Kind::Tyre,
+            touches: &[Balance::Tyre],
+            memory: Memory::None,
+            sign: Sign::Either,
+            aliases: &[Alias {
+                with: Id::ForceSaturation,
+                why: "Both flatten the curve at its top.",
+                run: "Repeat the ramp under half the load: a channel clips at the same force, a curve scales with the load.",
+            }],
+            smallest: "a change of the full skid's friction by a tenth of the peak's",
+            smallest_size: |_| 0.1,
+            compensation: Compensation::Not("another law than the filter's two-parameter one"),
+            carried: "as it is: the shape is the tyre's, whatever the run",
+            example: Example {
+                form: "two_sided",
+                parameters: &[0.0, 1.2],
+            },
+        }
     }
 }
 

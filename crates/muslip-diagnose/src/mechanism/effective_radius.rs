@@ -1,6 +1,9 @@
 //! The rolling radius is not the rig file's (constant, or changing with load or speed), so slip is biased.
 
-use super::{Context, Describe, Evidence, Id, Law, Mechanism, Parameter, Reported, Stage, State};
+use super::{
+    Balance, Compensation, Context, Describe, Evidence, Example, Guide, Id, Kind, Law, Mechanism,
+    Memory, Parameter, Reported, Sign, Stage, State,
+};
 use crate::number::Number;
 use crate::prepare::Series;
 
@@ -75,6 +78,26 @@ impl Describe for EffectiveRadius {
                 ),
             }
         )
+    }
+    fn guide(&self) -> Guide {
+        Guide {
+            physics: "Slip is the small difference of two large speeds, so an error of the rolling radius (pressure, wear, load, centrifugal growth) is an offset of slip of the same size. The force at a slip of nearly zero shows it, for the tyre is stiff there.",
+            kind: Kind::Wheel,
+            touches: &[Balance::Tyre],
+            memory: Memory::None,
+            sign: Sign::Either,
+            aliases: &[],
+            smallest: "one percent of the radius is gross; a tenth of it shows",
+            smallest_size: |_| 0.01,
+            compensation: Compensation::By(
+                "forms slip with the radius found, which may depend on the sample's load or speed",
+            ),
+            carried: "as it is, from the fresh run's own load and speed",
+            example: Example {
+                form: "constant",
+                parameters: &[0.01],
+            },
+        }
     }
 }
 

@@ -1,7 +1,10 @@
 //! The wheel speed reading varies once (or a few times) a revolution.
 
 use super::once_a_turn::Form;
-use super::{Context, Describe, Evidence, Id, Law, Mechanism, Parameter, Reported, Stage, State};
+use super::{
+    Balance, Compensation, Context, Describe, Evidence, Example, Guide, Id, Kind, Law, Mechanism,
+    Memory, Parameter, Reported, Sign, Stage, State,
+};
 use crate::number::Number;
 use crate::prepare::Series;
 
@@ -46,6 +49,24 @@ impl Describe for EncoderRipple {
     }
     fn predicts(&self) -> bool {
         !self.form.phase_per_run
+    }
+    fn guide(&self) -> Guide {
+        Guide {
+            physics: "A tone ring that is eccentric or unevenly cut makes the wheel speed seem to vary once a revolution while the wheel turns evenly. Slip takes it over, and where the curve is steep so does the predicted force.",
+            kind: Kind::Wheel,
+            touches: &[Balance::Tyre, Balance::Wheel],
+            memory: Memory::None,
+            sign: Sign::Either,
+            aliases: &[],
+            smallest: "three thousandths of the wheel speed",
+            smallest_size: |_| 0.003,
+            compensation: Compensation::Not("needs the wheel's angle, which a sample lacks"),
+            carried: "its size as it is; its phase only where the wheel's angle is known from run to run",
+            example: Example {
+                form: "first_order",
+                parameters: &[0.01, 0.0],
+            },
+        }
     }
 }
 

@@ -1,6 +1,9 @@
 //! The drag channel reports late by a fixed time.
 
-use super::{Context, Describe, Evidence, Id, Law, Mechanism, Parameter, Reported, Stage, State};
+use super::{
+    Alias, Balance, Compensation, Context, Describe, Evidence, Example, Guide, Id, Kind, Law,
+    Mechanism, Memory, Parameter, Reported, Sign, Stage, State,
+};
 use crate::number::Number;
 use crate::prepare::Series;
 
@@ -42,6 +45,52 @@ impl Describe for ForceDelay {
             "the drag channel reports {:.1} ms late",
             1e3 * reported[0].value
         )
+    }
+    fn guide(&self) -> Guide {
+        Guide {
+            physics: "A converter, a bus or a logger hands the drag on a fixed time after it acted. Every feature comes later, and none is rounded.",
+            kind: Kind::Chain,
+            touches: &[Balance::Tyre, Balance::Wheel, Balance::Vehicle],
+            memory: Memory::Kernel,
+            sign: Sign::Positive,
+            aliases: &[
+                Alias {
+                    with: Id::RelaxationLength,
+                    why: "At one speed a distance is a time.",
+                    run: "Repeat the same brake ramp at a third and at three times the speed: a lag of the channel keeps its time, a relaxation length keeps its distance.",
+                },
+                Alias {
+                    with: Id::SlipHysteresis,
+                    why: "At one rate of slip what comes late opens the same loop.",
+                    run: "Repeat the same brake ramp at a third and at three times the speed: a lag of the channel keeps its time, a relaxation length keeps its distance.",
+                },
+                Alias {
+                    with: Id::ForceLag,
+                    why: "A short filter delays slow features by its time constant.",
+                    run: "Tap the load cell (an impulse, wheel standing): a delay keeps the pulse's shape, a filter widens it, a resonance rings.",
+                },
+                Alias {
+                    with: Id::StructuralResonance,
+                    why: "Far below its frequency a resonance is a delay of 2 zeta/W.",
+                    run: "Tap the load cell (an impulse, wheel standing): a delay keeps the pulse's shape, a filter widens it, a resonance rings.",
+                },
+                Alias {
+                    with: Id::InertialReaction,
+                    why: "When the wheel slows before the force falls, its acceleration looks like the force's past.",
+                    run: "Spin the lifted wheel up and stop it with the brake: a reaction shows without any tyre force.",
+                },
+            ],
+            smallest: "five milliseconds, less where slip moves fast",
+            smallest_size: |_| 0.005,
+            compensation: Compensation::By(
+                "delays the slip and the load by the same time in a delay line, so that they meet the force that belongs to them",
+            ),
+            carried: "as it is",
+            example: Example {
+                form: "",
+                parameters: &[0.02],
+            },
+        }
     }
 }
 

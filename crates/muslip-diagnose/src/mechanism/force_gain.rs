@@ -1,6 +1,9 @@
 //! The drag channel's scale is wrong.
 
-use super::{Context, Describe, Evidence, Id, Law, Mechanism, Parameter, Reported, Stage, State};
+use super::{
+    Alias, Balance, Compensation, Context, Describe, Evidence, Example, Guide, Id, Kind, Law,
+    Mechanism, Memory, Parameter, Reported, Sign, Stage, State,
+};
 use crate::number::Number;
 use crate::prepare::Series;
 
@@ -33,6 +36,47 @@ impl Describe for ForceGain {
             "the drag channel reads {:.3} times the true drag",
             reported[0].value
         )
+    }
+    fn guide(&self) -> Guide {
+        Guide {
+            physics: "The drag channel's calibration is wrong by a factor. The tyre balance cannot see it, for peak friction takes it up; mass times deceleration, and the brake's torque, do.",
+            kind: Kind::LoadCell,
+            touches: &[Balance::Wheel, Balance::Vehicle],
+            memory: Memory::None,
+            sign: Sign::Either,
+            aliases: &[
+                Alias {
+                    with: Id::VehicleInertia,
+                    why: "Force over mass is all that a deceleration shows.",
+                    run: "Hang a known weight on the load cell; or ballast the vehicle by a known mass and repeat the stop.",
+                },
+                Alias {
+                    with: Id::WheelInertia,
+                    why: "Torque over inertia is all that the wheel's acceleration shows.",
+                    run: "Hang a known weight on the load cell; or ballast the vehicle by a known mass and repeat the stop.",
+                },
+                Alias {
+                    with: Id::BearingDrag,
+                    why: "Under a steady drag a share of it is a constant torque.",
+                    run: "Hang a known weight on the load cell; or ballast the vehicle by a known mass and repeat the stop.",
+                },
+                Alias {
+                    with: Id::GradeOrDrive,
+                    why: "Under a steady drag a share of it is a constant force.",
+                    run: "Hang a known weight on the load cell; or ballast the vehicle by a known mass and repeat the stop.",
+                },
+            ],
+            smallest: "three percent of the scale",
+            smallest_size: |_| 0.03,
+            compensation: Compensation::Not(
+                "the scale of the drag channel: peak friction is wrong by the same factor",
+            ),
+            carried: "as it is; the load cell of a fresh run reads as wrongly",
+            example: Example {
+                form: "",
+                parameters: &[0.1],
+            },
+        }
     }
 }
 

@@ -1,7 +1,10 @@
 //! The drag channel passes a first-order low-pass filter.
 
 use super::filters::first_order;
-use super::{Context, Describe, Evidence, Id, Law, Mechanism, Parameter, Reported, Stage, State};
+use super::{
+    Alias, Balance, Compensation, Context, Describe, Evidence, Example, Guide, Id, Kind, Law,
+    Mechanism, Memory, Parameter, Reported, Sign, Stage, State,
+};
 use crate::number::Number;
 use crate::prepare::Series;
 
@@ -43,6 +46,47 @@ impl Describe for ForceLag {
             "the drag channel is low-pass filtered with a time constant of {:.1} ms",
             1e3 * reported[0].value
         )
+    }
+    fn guide(&self) -> Guide {
+        Guide {
+            physics: "An anti-aliasing filter or the averaging of an amplifier follows the force with a time constant: slow features come late by it, fast ones are rounded and weakened. It does not depend on the speed.",
+            kind: Kind::Chain,
+            touches: &[Balance::Tyre, Balance::Wheel, Balance::Vehicle],
+            memory: Memory::Kernel,
+            sign: Sign::Positive,
+            aliases: &[
+                Alias {
+                    with: Id::RelaxationLength,
+                    why: "At one speed a distance is a time.",
+                    run: "Repeat the same brake ramp at a third and at three times the speed: a lag of the channel keeps its time, a relaxation length keeps its distance.",
+                },
+                Alias {
+                    with: Id::SlipHysteresis,
+                    why: "At one rate of slip what comes late opens the same loop.",
+                    run: "Repeat the same brake ramp at a third and at three times the speed: a lag of the channel keeps its time, a relaxation length keeps its distance.",
+                },
+                Alias {
+                    with: Id::StructuralResonance,
+                    why: "Both filter; well damped they are nearly one.",
+                    run: "Tap the load cell with the wheel standing, then repeat the ramp at another speed: a resonance keeps its frequency.",
+                },
+                Alias {
+                    with: Id::InertialReaction,
+                    why: "When the wheel slows before the force falls, its acceleration looks like the force's past.",
+                    run: "Spin the lifted wheel up and stop it with the brake: a reaction shows without any tyre force.",
+                },
+            ],
+            smallest: "five milliseconds, less where slip moves fast",
+            smallest_size: |_| 0.005,
+            compensation: Compensation::By(
+                "filters the slip and the load (or the friction) by the same time constant",
+            ),
+            carried: "as it is: settled at the run's first sample",
+            example: Example {
+                form: "",
+                parameters: &[0.03],
+            },
+        }
     }
 }
 

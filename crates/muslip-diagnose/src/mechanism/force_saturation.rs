@@ -1,6 +1,9 @@
 //! The drag channel clips.
 
-use super::{Context, Describe, Evidence, Id, Law, Mechanism, Parameter, Reported, Stage, State};
+use super::{
+    Balance, Compensation, Context, Describe, Evidence, Example, Guide, Id, Kind, Law, Mechanism,
+    Memory, Parameter, Reported, Sign, Stage, State,
+};
 use crate::number::Number;
 use crate::prepare::Series;
 
@@ -41,6 +44,24 @@ impl Describe for ForceSaturation {
     }
     fn statement(&self, reported: &[Reported<f64>], _p: &[f64]) -> String {
         format!("the drag channel clips at {:.0} N", reported[0].value)
+    }
+    fn guide(&self) -> Guide {
+        Guide {
+            physics: "Above its range the amplifier or converter clips: the reading stays where it is however the force grows. Below, nothing is wrong.",
+            kind: Kind::LoadCell,
+            touches: &[Balance::Tyre, Balance::Wheel, Balance::Vehicle],
+            memory: Memory::None,
+            sign: Sign::Positive,
+            aliases: &[],
+            smallest: "a limit five percent below the largest drag",
+            smallest_size: |c| 0.05 * c.max_drag,
+            compensation: Compensation::Not("the filter has no compensation for it"),
+            carried: "as it is",
+            example: Example {
+                form: "",
+                parameters: &[2600.0],
+            },
+        }
     }
 }
 

@@ -1,6 +1,9 @@
 //! A constant deceleration or acceleration that is not tyre drag.
 
-use super::{Context, Describe, Evidence, Id, Law, Mechanism, Parameter, Reported, Stage, State};
+use super::{
+    Alias, Balance, Compensation, Context, Describe, Evidence, Example, Guide, Id, Kind, Law,
+    Mechanism, Memory, Parameter, Reported, Sign, Stage, State,
+};
 use crate::number::Number;
 use crate::prepare::Series;
 
@@ -39,6 +42,28 @@ impl Describe for GradeOrDrive {
                 "drives"
             }
         )
+    }
+    fn guide(&self) -> Guide {
+        Guide {
+            physics: "A slope of the track, a dragging second brake or a drive that is not quite off acts on the vehicle with a constant force. It does so whether the wheel is braked or not.",
+            kind: Kind::Vehicle,
+            touches: &[Balance::Vehicle],
+            memory: Memory::None,
+            sign: Sign::Either,
+            aliases: &[Alias {
+                with: Id::VehicleInertia,
+                why: "Under a steady drag a share of the deceleration is a constant.",
+                run: "Coast down unbraked from the highest speed, in both directions of the track.",
+            }],
+            smallest: "three percent of the largest drag",
+            smallest_size: |c| 0.03 * c.max_drag.max(c.drag_sigma),
+            compensation: Compensation::Not("not of the tyre balance: it does not touch the curve"),
+            carried: "as it is, on the same track in the same direction",
+            example: Example {
+                form: "",
+                parameters: &[-300.0],
+            },
+        }
     }
 }
 

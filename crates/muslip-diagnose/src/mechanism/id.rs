@@ -81,6 +81,8 @@ ids! {
     ForceSaturation "force_saturation" Tyre "a drag channel that clips";
     RunOut "run_out" Tyre "drag that varies with the wheel's angle";
     EncoderRipple "encoder_ripple" Tyre "a wheel speed reading that varies with the wheel's angle";
+    VehicleSpeedDelay "vehicle_speed_delay" Tyre "a vehicle-speed channel that reports late";
+    WheelSpeedDelay "wheel_speed_delay" Tyre "a wheel-speed channel that reports late";
     AeroDrag "aero_drag" Vehicle "a deceleration that grows with speed squared";
     GradeOrDrive "grade_or_drive" Vehicle "a constant force on the vehicle";
     VehicleInertia "vehicle_inertia" Vehicle "a translating mass that is not the rig file's";

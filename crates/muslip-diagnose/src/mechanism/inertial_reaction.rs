@@ -1,6 +1,9 @@
 //! The drag channel also reads a share of the wheel's angular acceleration.
 
-use super::{Context, Describe, Evidence, Id, Law, Mechanism, Parameter, Reported, Stage, State};
+use super::{
+    Alias, Balance, Compensation, Context, Describe, Evidence, Example, Guide, Id, Kind, Law,
+    Mechanism, Memory, Parameter, Reported, Sign, Stage, State,
+};
 use crate::number::Number;
 use crate::prepare::Series;
 
@@ -40,6 +43,35 @@ impl Describe for InertialReaction {
             "the drag channel also reads the wheel's angular acceleration, {:.3} N per rad/s2",
             reported[0].value
         )
+    }
+    fn guide(&self) -> Guide {
+        Guide {
+            physics: "The load cell sits where the wheel's own inertia pulls on it too, so what accelerates the wheel is read as drag. It shows when the wheel locks or spins up, and not at a constant speed.",
+            kind: Kind::LoadCell,
+            touches: &[Balance::Tyre],
+            memory: Memory::None,
+            sign: Sign::Either,
+            aliases: &[
+                Alias {
+                    with: Id::SlipHysteresis,
+                    why: "The wheel slows while slip rises and speeds up while it falls.",
+                    run: "Spin the lifted wheel up and stop it with the brake: a reaction shows without any tyre force.",
+                },
+                Alias {
+                    with: Id::RelaxationLength,
+                    why: "What is in proportion to the rate of slip looks like a lag.",
+                    run: "Spin the lifted wheel up and stop it with the brake: a reaction shows without any tyre force.",
+                },
+            ],
+            smallest: "a tenth of what the wheel's whole inertia would make at its radius",
+            smallest_size: |c| 0.1 * c.inertia / c.radius.max(0.005),
+            compensation: Compensation::Not("the filter has no compensation for it"),
+            carried: "as it is, from the fresh run's own wheel speed",
+            example: Example {
+                form: "",
+                parameters: &[1.5],
+            },
+        }
     }
 }
 

@@ -1,6 +1,9 @@
 //! The drag channel reads a share of the normal force, also at standstill.
 
-use super::{Context, Describe, Evidence, Id, Law, Mechanism, Parameter, Reported, Stage, State};
+use super::{
+    Alias, Balance, Compensation, Context, Describe, Evidence, Example, Guide, Id, Kind, Law,
+    Mechanism, Memory, Parameter, Reported, Sign, Stage, State,
+};
 use crate::number::Number;
 use crate::prepare::Series;
 
@@ -33,6 +36,40 @@ impl Describe for LoadCrosstalk {
             "the drag channel reads {:.2} % of the normal force on top of the drag",
             100.0 * reported[0].value
         )
+    }
+    fn guide(&self) -> Guide {
+        Guide {
+            physics: "A load cell that is not mounted square, or whose axes are not decoupled, reads a share of the normal force as drag. It does so at standstill too.",
+            kind: Kind::LoadCell,
+            touches: &[Balance::Tyre, Balance::Wheel, Balance::Vehicle],
+            memory: Memory::None,
+            sign: Sign::Either,
+            aliases: &[
+                Alias {
+                    with: Id::RollingResistance,
+                    why: "While the wheel rolls both are a share of the load.",
+                    run: "Load the standing wheel in steps, brake released: crosstalk moves the reading with the load, nothing else does.",
+                },
+                Alias {
+                    with: Id::ZeroDrift,
+                    why: "Under a constant load a share of it is a constant.",
+                    run: "Load the standing wheel in steps, brake released: crosstalk moves the reading with the load, nothing else does.",
+                },
+                Alias {
+                    with: Id::LoadSensitivity,
+                    why: "Both are read off how the drag goes with the load.",
+                    run: "Load the standing wheel in steps, brake released: crosstalk moves the reading with the load, nothing else does.",
+                },
+            ],
+            smallest: "one percent of the load",
+            smallest_size: |_| 0.01,
+            compensation: Compensation::By("takes the share of the sample's load off the drag"),
+            carried: "as it is, from the fresh run's own load",
+            example: Example {
+                form: "",
+                parameters: &[0.03],
+            },
+        }
     }
 }
 

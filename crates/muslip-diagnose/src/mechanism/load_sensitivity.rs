@@ -1,6 +1,9 @@
 //! Peak friction changes with normal force.
 
-use super::{Context, Describe, Evidence, Id, Law, Mechanism, Parameter, Reported, Stage, State};
+use super::{
+    Balance, Compensation, Context, Describe, Evidence, Example, Guide, Id, Kind, Law, Mechanism,
+    Memory, Parameter, Reported, Sign, Stage, State,
+};
 use crate::number::Number;
 use crate::prepare::Series;
 
@@ -47,6 +50,26 @@ impl Describe for LoadSensitivity {
             "peak friction falls by {:.2} % for each 10 % more normal force",
             10.0 * reported[0].value
         )
+    }
+    fn guide(&self) -> Guide {
+        Guide {
+            physics: "Rubber grips by a real area of contact that grows more slowly than the load on it, so the friction coefficient falls as the wheel is pressed down harder. The slip at which it peaks may move as well, since the carcass stiffens with load.",
+            kind: Kind::Tyre,
+            touches: &[Balance::Tyre],
+            memory: Memory::None,
+            sign: Sign::Either,
+            aliases: &[],
+            smallest: "an exponent of a tenth: 1 % of friction for each 10 % of load",
+            smallest_size: |_| 0.1,
+            compensation: Compensation::By(
+                "divides peak friction (and the slip at the peak) by their dependence on the sample's load; the estimate holds at the campaign's mean load",
+            ),
+            carried: "as it is, from the fresh run's own load",
+            example: Example {
+                form: "peak",
+                parameters: &[0.3],
+            },
+        }
     }
 }
 

@@ -1,6 +1,7 @@
 //! The vocabulary: what a simulation may have left out, one type per mechanism.
 //!
-//! A new mechanism is a new file here, a variant of [`Id`] and a line in [`catalogue`]. Each says where
+//! A new mechanism is a new file here, a variant of [`Id`] and a line in [`catalogue`]. Each has its section of the
+//! field guide ([`Guide`]: physics, look-alikes, the run that tells them apart) and says where
 //! in the chain from speeds to reading it acts ([`Stage`]), what its parameters are and where a search
 //! for them starts, and how it changes the [`State`] of one run. Some have several forms (a speed
 //! effect may follow the sliding or the vehicle speed); each form is an entry of the catalogue.
@@ -18,6 +19,7 @@ mod force_gain;
 mod force_lag;
 mod force_saturation;
 mod grade_or_drive;
+mod guide;
 mod id;
 mod inertial_reaction;
 mod load_crosstalk;
@@ -27,15 +29,19 @@ mod relaxation_length;
 mod rolling_resistance;
 mod run_out;
 mod slip_hysteresis;
+mod speed_delay;
 mod speed_sensitivity;
 mod structural_resonance;
 mod surface_patch;
 mod thermal_fade;
 mod vehicle_inertia;
+mod vehicle_speed_delay;
 mod wear_drift;
 mod wheel_inertia;
+mod wheel_speed_delay;
 mod zero_drift;
 
+pub use guide::{Alias, Compensation, Example, Guide, Kind, Memory, Sign};
 pub use id::{Balance, Id};
 
 use serde::{Deserialize, Serialize};
@@ -347,6 +353,8 @@ pub trait Describe: Send + Sync {
     fn equation(&self) -> &'static str;
     /// One sentence for an engineer, with the figure and its unit.
     fn statement(&self, reported: &[Reported<f64>], parameters: &[f64]) -> String;
+    /// Its section of the field guide, the same for all its forms.
+    fn guide(&self) -> Guide;
     /// Which parameter is its size, where one is: at its null the mechanism is absent.
     fn amplitude(&self) -> Option<usize> {
         Some(0)
@@ -430,5 +438,7 @@ pub fn catalogue<T: Number>() -> Vec<Box<dyn Mechanism<T>>> {
     for form in bearing_drag::FORMS {
         all.push(Box::new(bearing_drag::BearingDrag { form }));
     }
+    all.push(Box::new(vehicle_speed_delay::VehicleSpeedDelay));
+    all.push(Box::new(wheel_speed_delay::WheelSpeedDelay));
     all
 }

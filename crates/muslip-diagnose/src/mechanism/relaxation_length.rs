@@ -1,7 +1,10 @@
 //! Force builds up over a rolling distance (lag time = length / speed).
 
 use super::filters::first_order;
-use super::{Context, Describe, Evidence, Id, Law, Mechanism, Parameter, Reported, Stage, State};
+use super::{
+    Balance, Compensation, Context, Describe, Evidence, Example, Guide, Id, Kind, Law, Mechanism,
+    Memory, Parameter, Reported, Sign, Stage, State,
+};
 use crate::number::Number;
 use crate::prepare::Series;
 
@@ -68,6 +71,26 @@ impl Describe for RelaxationLength {
     }
     fn statement(&self, reported: &[Reported<f64>], _p: &[f64]) -> String {
         format!("force builds up over {:.3} m of rolling", reported[0].value)
+    }
+    fn guide(&self) -> Guide {
+        Guide {
+            physics: "The carcass must deflect before the contact patch feels a new slip, and it deflects as the wheel rolls: the force follows slip over a rolling distance and not over a time. The lag is long at low speed and short at high speed.",
+            kind: Kind::Tyre,
+            touches: &[Balance::Tyre],
+            memory: Memory::Kernel,
+            sign: Sign::Positive,
+            aliases: &[],
+            smallest: "three tenths of the wheel's radius",
+            smallest_size: |c| 0.3 * c.radius,
+            compensation: Compensation::By(
+                "filters the slip (or the friction) that the update is given by the same distance",
+            ),
+            carried: "as it is: settled at the run's first sample",
+            example: Example {
+                form: "slip",
+                parameters: &[0.6],
+            },
+        }
     }
 }
 

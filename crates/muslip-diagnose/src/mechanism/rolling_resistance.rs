@@ -1,6 +1,9 @@
 //! Drag on a rolling, unbraked wheel, proportional to load, absent at standstill.
 
-use super::{Context, Describe, Evidence, Id, Law, Mechanism, Parameter, Reported, Stage, State};
+use super::{
+    Alias, Balance, Compensation, Context, Describe, Evidence, Example, Guide, Id, Kind, Law,
+    Mechanism, Memory, Parameter, Reported, Sign, Stage, State,
+};
 use crate::number::Number;
 use crate::prepare::Series;
 
@@ -51,6 +54,35 @@ impl Describe for RollingResistance {
             "the rolling wheel drags with {:.4} of the normal force without any braking",
             reported[0].value
         )
+    }
+    fn guide(&self) -> Guide {
+        Guide {
+            physics: "A rolling tyre loses energy in the rubber that is bent at every turn, which shows as a drag in proportion to the load even without braking. It is gone at standstill, and acts on the wheel's balance as well.",
+            kind: Kind::Tyre,
+            touches: &[Balance::Tyre, Balance::Wheel],
+            memory: Memory::None,
+            sign: Sign::Either,
+            aliases: &[
+                Alias {
+                    with: Id::EffectiveRadius,
+                    why: "A wrong radius biases slip by a constant, which near free rolling is a constant force.",
+                    run: "Roll unbraked and then drive the wheel slightly: rolling resistance stays, a wrong radius changes its sign with slip.",
+                },
+                Alias {
+                    with: Id::ZeroDrift,
+                    why: "Both are a force while nothing brakes.",
+                    run: "Roll unbraked and then drive the wheel slightly: rolling resistance stays, a wrong radius changes its sign with slip.",
+                },
+            ],
+            smallest: "one percent of the load",
+            smallest_size: |_| 0.01,
+            compensation: Compensation::Not("the filter has no compensation for it"),
+            carried: "as it is, from the fresh run's own load and speed",
+            example: Example {
+                form: "constant",
+                parameters: &[0.015],
+            },
+        }
     }
 }
 

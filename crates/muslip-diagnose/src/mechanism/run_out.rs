@@ -1,7 +1,10 @@
 //! Drag varies once (or a few times) a wheel revolution.
 
 use super::once_a_turn::Form;
-use super::{Context, Describe, Evidence, Id, Law, Mechanism, Parameter, Reported, Stage, State};
+use super::{
+    Alias, Balance, Compensation, Context, Describe, Evidence, Example, Guide, Id, Kind, Law,
+    Mechanism, Memory, Parameter, Reported, Sign, Stage, State,
+};
 use crate::number::Number;
 use crate::prepare::Series;
 
@@ -46,6 +49,28 @@ impl Describe for RunOut {
     }
     fn predicts(&self) -> bool {
         !self.form.phase_per_run
+    }
+    fn guide(&self) -> Guide {
+        Guide {
+            physics: "A wheel or a drum that is out of round presses harder and less hard once a revolution, and a tyre is not equally stiff all around. The drag varies with the wheel's angle, in proportion to itself.",
+            kind: Kind::Wheel,
+            touches: &[Balance::Tyre],
+            memory: Memory::None,
+            sign: Sign::Either,
+            aliases: &[Alias {
+                with: Id::EncoderRipple,
+                why: "Both repeat with the wheel's angle; a rippling speed is a rippling slip, hence force.",
+                run: "Turn the encoder's ring on the hub by a quarter and repeat: a ripple of the encoder moves with it, a run-out of the tyre does not.",
+            }],
+            smallest: "three percent of the drag",
+            smallest_size: |_| 0.03,
+            compensation: Compensation::Not("needs the wheel's angle, which a sample lacks"),
+            carried: "its size as it is; its phase only where the wheel's angle is known from run to run",
+            example: Example {
+                form: "first_order",
+                parameters: &[0.06, 0.0],
+            },
+        }
     }
 }
 

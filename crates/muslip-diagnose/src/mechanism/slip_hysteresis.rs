@@ -1,6 +1,9 @@
 //! Rising slip and falling slip follow different curves, whatever the rate.
 
-use super::{Context, Describe, Evidence, Id, Law, Mechanism, Parameter, Reported, Stage, State};
+use super::{
+    Balance, Compensation, Context, Describe, Evidence, Example, Guide, Id, Kind, Law, Mechanism,
+    Memory, Parameter, Reported, Sign, Stage, State,
+};
 use crate::number::Number;
 use crate::prepare::Series;
 
@@ -36,6 +39,24 @@ impl Describe for SlipHysteresis {
             "friction follows a loop: rising and falling slip differ by {:.1} % either side of their mean, whatever the rate",
             100.0 * reported[0].value
         )
+    }
+    fn guide(&self) -> Guide {
+        Guide {
+            physics: "On the way into a skid the contact patch is stuck and on the way back it is already sliding, so rising and falling slip follow different curves. The loop does not depend on the rate: that is what a lag would do.",
+            kind: Kind::Tyre,
+            touches: &[Balance::Tyre],
+            memory: Memory::Kernel,
+            sign: Sign::Either,
+            aliases: &[],
+            smallest: "half a loop's height of three percent of friction",
+            smallest_size: |_| 0.03,
+            compensation: Compensation::Not("the filter has no compensation for it"),
+            carried: "as it is: on the middle of the loop at the run's first sample",
+            example: Example {
+                form: "",
+                parameters: &[0.08, 0.02],
+            },
+        }
     }
 }
 

@@ -1,6 +1,9 @@
 //! Friction changes with sliding speed or vehicle speed.
 
-use super::{Context, Describe, Evidence, Id, Law, Mechanism, Parameter, Reported, Stage, State};
+use super::{
+    Alias, Balance, Compensation, Context, Describe, Evidence, Example, Guide, Id, Kind, Law,
+    Mechanism, Memory, Parameter, Reported, Sign, Stage, State,
+};
 use crate::number::Number;
 use crate::prepare::Series;
 
@@ -110,6 +113,42 @@ impl Describe for SpeedSensitivity {
                 "sliding"
             }
         )
+    }
+    fn guide(&self) -> Guide {
+        Guide {
+            physics: "How well rubber grips depends on how fast it slides, for its losses depend on the rate at which the road's roughness deforms it; on a wet road water has less time to leave at higher speed. Friction then depends on the sliding speed or on the vehicle's, beside slip.",
+            kind: Kind::Tyre,
+            touches: &[Balance::Tyre],
+            memory: Memory::None,
+            sign: Sign::Either,
+            aliases: &[
+                Alias {
+                    with: Id::CurveShape,
+                    why: "Sliding speed is slip times speed: in a campaign at one speed the two are one variable.",
+                    run: "Repeat the ramp at two speeds a factor of three apart, at one load: shape follows slip, speed sensitivity follows sliding speed.",
+                },
+                Alias {
+                    with: Id::LoadSensitivity,
+                    why: "Where load moves with speed (pitch, downforce), either explains what the other does.",
+                    run: "Repeat the ramp at two speeds a factor of three apart, at one load: shape follows slip, speed sensitivity follows sliding speed.",
+                },
+                Alias {
+                    with: Id::WearDrift,
+                    why: "Where later runs are faster or slower, use and speed go together.",
+                    run: "Repeat the ramp at two speeds a factor of three apart, at one load: shape follows slip, speed sensitivity follows sliding speed.",
+                },
+            ],
+            smallest: "a change of friction by 5 % over the campaign's mean speed",
+            smallest_size: |c| 0.05 / c.mean_speed.max(0.1),
+            compensation: Compensation::By(
+                "divides friction by its factor at the sample's speed; the estimate holds without sliding or at the mean vehicle speed",
+            ),
+            carried: "as it is, from the fresh run's own speeds",
+            example: Example {
+                form: "sliding_linear",
+                parameters: &[-0.03],
+            },
+        }
     }
 }
 

@@ -1,7 +1,10 @@
 //! The load cell and its mount ring: a lightly damped second-order response.
 
 use super::filters::second_order;
-use super::{Context, Describe, Evidence, Id, Law, Mechanism, Parameter, Reported, Stage, State};
+use super::{
+    Alias, Balance, Compensation, Context, Describe, Evidence, Example, Guide, Id, Kind, Law,
+    Mechanism, Memory, Parameter, Reported, Sign, Stage, State,
+};
 use crate::number::Number;
 use crate::prepare::Series;
 
@@ -49,6 +52,35 @@ impl Describe for StructuralResonance {
             "the load cell and its mount ring at {:.1} Hz with a damping ratio of {:.3}",
             reported[0].value, reported[1].value
         )
+    }
+    fn guide(&self) -> Guide {
+        Guide {
+            physics: "Load cell and mount are a mass on a spring: each change of the force makes them ring at their own frequency until damping has taken it. The mean is right, the oscillation is not the tyre's.",
+            kind: Kind::LoadCell,
+            touches: &[Balance::Tyre, Balance::Wheel, Balance::Vehicle],
+            memory: Memory::Kernel,
+            sign: Sign::Positive,
+            aliases: &[
+                Alias {
+                    with: Id::RunOut,
+                    why: "At one speed a revolution is a frequency.",
+                    run: "Tap the load cell with the wheel standing, then repeat the ramp at another speed: a resonance keeps its frequency.",
+                },
+                Alias {
+                    with: Id::InertialReaction,
+                    why: "A wheel that oscillates is read as a force that does.",
+                    run: "Tap the load cell with the wheel standing, then repeat the ramp at another speed: a resonance keeps its frequency.",
+                },
+            ],
+            smallest: "a frequency that lies within the recording's band: below about 30 Hz it disturbs a ramp",
+            smallest_size: |_| 30.0,
+            compensation: Compensation::Not("the filter has no compensation for it"),
+            carried: "as it is: settled at the run's first sample",
+            example: Example {
+                form: "",
+                parameters: &[18.0, 0.05],
+            },
+        }
     }
 }
 

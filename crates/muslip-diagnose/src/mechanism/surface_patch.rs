@@ -1,6 +1,9 @@
 //! Friction differs over a stretch of the track.
 
-use super::{Context, Describe, Evidence, Id, Law, Mechanism, Parameter, Reported, Stage, State};
+use super::{
+    Alias, Balance, Compensation, Context, Describe, Evidence, Example, Guide, Id, Kind, Law,
+    Mechanism, Memory, Parameter, Reported, Sign, Stage, State,
+};
 use crate::number::Number;
 use crate::prepare::Series;
 
@@ -132,6 +135,40 @@ impl Describe for SurfacePatch {
             reported[0].value,
             p[0] + p[1]
         )
+    }
+    fn guide(&self) -> Guide {
+        Guide {
+            physics: "A stretch of the track is wetter, dustier or smoother than the rest, and friction changes where the tyre enters it and where it leaves. It belongs to the place and not to the tyre.",
+            kind: Kind::Tyre,
+            touches: &[Balance::Tyre],
+            memory: Memory::None,
+            sign: Sign::Either,
+            aliases: &[
+                Alias {
+                    with: Id::ThermalFade,
+                    why: "A patch late in the run takes friction where heat does.",
+                    run: "Run the same track again, entering it ten metres later: a patch stays where it is on the track.",
+                },
+                Alias {
+                    with: Id::ZeroDrift,
+                    why: "Both begin somewhere along the run.",
+                    run: "Run the same track again, entering it ten metres later: a patch stays where it is on the track.",
+                },
+                Alias {
+                    with: Id::SpeedSensitivity,
+                    why: "A vehicle that slows down alike in every run is as fast at the patch each time.",
+                    run: "Run the same track again, entering it ten metres later: a patch stays where it is on the track.",
+                },
+            ],
+            smallest: "three percent of friction over a few metres",
+            smallest_size: |_| 0.03,
+            compensation: Compensation::Not("a property of the track, not of the tyre"),
+            carried: "only to runs that start at the same place of the same track: distance counts from the first sample",
+            example: Example {
+                form: "one",
+                parameters: &[20.0, 15.0, -0.15],
+            },
+        }
     }
 }
 

@@ -1,6 +1,9 @@
 //! Friction changes with tread temperature, which friction power raises and time cools.
 
-use super::{Context, Describe, Evidence, Id, Law, Mechanism, Parameter, Reported, Stage, State};
+use super::{
+    Alias, Balance, Compensation, Context, Describe, Evidence, Example, Guide, Id, Kind, Law,
+    Mechanism, Memory, Parameter, Reported, Sign, Stage, State,
+};
 use crate::number::Number;
 use crate::prepare::Series;
 
@@ -84,6 +87,52 @@ impl Describe for ThermalFade {
             if p[0] >= 0.0 { "fades" } else { "rises" },
             reported[0].value
         )
+    }
+    fn guide(&self) -> Guide {
+        Guide {
+            physics: "Friction power heats the tread, and rubber grips less (cold rubber: more) as it warms; between applications it cools again. So the same slip gives another force later in the same application, and recovers after a rest.",
+            kind: Kind::Tyre,
+            touches: &[Balance::Tyre],
+            memory: Memory::Run,
+            sign: Sign::Either,
+            aliases: &[
+                Alias {
+                    with: Id::SpeedSensitivity,
+                    why: "Sliding speed and friction power rise together within one application.",
+                    run: "Repeat the same ramp after rests of 0, 30 and 120 s: heat recovers, wear does not, speed and shape do not care.",
+                },
+                Alias {
+                    with: Id::WearDrift,
+                    why: "Both lower friction the more work was done; only heat forgets.",
+                    run: "Repeat the same ramp after rests of 0, 30 and 120 s: heat recovers, wear does not, speed and shape do not care.",
+                },
+                Alias {
+                    with: Id::CurveShape,
+                    why: "Skid comes late in an application: heat takes from the same side of the curve.",
+                    run: "Repeat the same ramp after rests of 0, 30 and 120 s: heat recovers, wear does not, speed and shape do not care.",
+                },
+                Alias {
+                    with: Id::ZeroDrift,
+                    why: "Both grow with time in a run.",
+                    run: "Repeat the same ramp after rests of 0, 30 and 120 s: heat recovers, wear does not, speed and shape do not care.",
+                },
+                Alias {
+                    with: Id::SlipHysteresis,
+                    why: "The way back from a skid is hotter than the way there, so the curve opens into a loop.",
+                    run: "Repeat the same ramp after rests of 0, 30 and 120 s: heat recovers, wear does not, speed and shape do not care.",
+                },
+            ],
+            smallest: "a time constant that is known to 5 %: friction that changes by some percent within a run",
+            smallest_size: |_| 0.05,
+            compensation: Compensation::By(
+                "follows the temperature by the measured friction power and divides friction by its factor; the estimate holds for the cold tread",
+            ),
+            carried: "starts cold in every run; heated by the fresh run's own friction power",
+            example: Example {
+                form: "linear",
+                parameters: &[0.35, 4.0],
+            },
+        }
     }
 }
 

@@ -1,6 +1,9 @@
 //! The translating mass is not the rig file's.
 
-use super::{Context, Describe, Evidence, Id, Law, Mechanism, Parameter, Reported, Stage, State};
+use super::{
+    Balance, Compensation, Context, Describe, Evidence, Example, Guide, Id, Kind, Law, Mechanism,
+    Memory, Parameter, Reported, Sign, Stage, State,
+};
 use crate::number::Number;
 use crate::prepare::Series;
 
@@ -30,6 +33,24 @@ impl Describe for VehicleInertia {
     }
     fn statement(&self, reported: &[Reported<f64>], _p: &[f64]) -> String {
         format!("the translating mass is {:.4} kg", reported[0].value)
+    }
+    fn guide(&self) -> Guide {
+        Guide {
+            physics: "The mass that the tyre's drag slows is not the rig file's: fuel, passengers, a drum's own inertia. Deceleration under a known force tells it.",
+            kind: Kind::Vehicle,
+            touches: &[Balance::Vehicle],
+            memory: Memory::None,
+            sign: Sign::Either,
+            aliases: &[],
+            smallest: "three percent of the mass",
+            smallest_size: |c| 0.03 * c.mass,
+            compensation: Compensation::Not("not of the tyre balance: it does not touch the curve"),
+            carried: "as it is",
+            example: Example {
+                form: "",
+                parameters: &[0.15],
+            },
+        }
     }
 }
 

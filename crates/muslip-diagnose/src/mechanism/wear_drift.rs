@@ -1,6 +1,9 @@
 //! Friction shifts with accumulated sliding energy or from run to run, and does not recover.
 
-use super::{Context, Describe, Evidence, Id, Law, Mechanism, Parameter, Reported, Stage, State};
+use super::{
+    Alias, Balance, Compensation, Context, Describe, Evidence, Example, Guide, Id, Kind, Law,
+    Mechanism, Memory, Parameter, Reported, Sign, Stage, State,
+};
 use crate::number::Number;
 use crate::prepare::Series;
 
@@ -89,6 +92,40 @@ impl Describe for WearDrift {
             "friction has fallen by {:.1} % from the first run to the last and does not recover",
             100.0 * reported[0].value
         )
+    }
+    fn guide(&self) -> Guide {
+        Guide {
+            physics: "Sliding removes rubber, polishes the road or runs a fresh tread in: friction shifts with the energy that was spent and does not come back after a rest. Within one run it is little, from the first run to the last it adds up.",
+            kind: Kind::Tyre,
+            touches: &[Balance::Tyre],
+            memory: Memory::Campaign,
+            sign: Sign::Either,
+            aliases: &[
+                Alias {
+                    with: Id::ZeroDrift,
+                    why: "Both shift from run to run; one is a factor, the other a force.",
+                    run: "Repeat the first run at the end, and read the zero with the wheel lifted before and after.",
+                },
+                Alias {
+                    with: Id::SurfacePatch,
+                    why: "Where each run starts further on, a place is a run.",
+                    run: "Repeat the first run at the end, and read the zero with the wheel lifted before and after.",
+                },
+                Alias {
+                    with: Id::LoadSensitivity,
+                    why: "Where the load changes from run to run, it goes with use.",
+                    run: "Repeat the first run at the end, and read the zero with the wheel lifted before and after.",
+                },
+            ],
+            smallest: "three percent of friction from the first run to the last",
+            smallest_size: |_| 0.03,
+            compensation: Compensation::Not("the filter has no compensation for it"),
+            carried: "by the order of runs: a fresh run comes after all others, with all their energy spent",
+            example: Example {
+                form: "energy",
+                parameters: &[0.15],
+            },
+        }
     }
 }
 

@@ -1,6 +1,9 @@
 //! The wheel's inertia is not the rig file's.
 
-use super::{Context, Describe, Evidence, Id, Law, Mechanism, Parameter, Reported, Stage, State};
+use super::{
+    Balance, Compensation, Context, Describe, Evidence, Example, Guide, Id, Kind, Law, Mechanism,
+    Memory, Parameter, Reported, Sign, Stage, State,
+};
 use crate::number::Number;
 use crate::prepare::Series;
 
@@ -30,6 +33,24 @@ impl Describe for WheelInertia {
     }
     fn statement(&self, reported: &[Reported<f64>], _p: &[f64]) -> String {
         format!("the wheel's inertia is {:.5} kg m2", reported[0].value)
+    }
+    fn guide(&self) -> Guide {
+        Guide {
+            physics: "Disc, hub and drive turn with the wheel and add to its inertia, or the rig file has another wheel's. Torque over angular acceleration tells it.",
+            kind: Kind::Wheel,
+            touches: &[Balance::Wheel],
+            memory: Memory::None,
+            sign: Sign::Either,
+            aliases: &[],
+            smallest: "a tenth of the inertia",
+            smallest_size: |c| 0.1 * c.inertia,
+            compensation: Compensation::Not("not of the tyre balance: it does not touch the curve"),
+            carried: "as it is",
+            example: Example {
+                form: "",
+                parameters: &[0.3],
+            },
+        }
     }
 }
 

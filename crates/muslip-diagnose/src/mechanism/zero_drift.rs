@@ -1,6 +1,9 @@
 //! The drag channel's zero moves with time.
 
-use super::{Context, Describe, Evidence, Id, Law, Mechanism, Parameter, Reported, Stage, State};
+use super::{
+    Balance, Compensation, Context, Describe, Evidence, Example, Guide, Id, Kind, Law, Mechanism,
+    Memory, Parameter, Reported, Sign, Stage, State,
+};
 use crate::number::Number;
 use crate::prepare::Series;
 
@@ -121,6 +124,24 @@ impl Describe for ZeroDrift {
                 "the drag channel's zero warms up by {:.1} N with a time constant of {:.2} s",
                 p[0], reported[0].value
             )
+        }
+    }
+    fn guide(&self) -> Guide {
+        Guide {
+            physics: "Strain gauges and amplifiers warm up, and what they read of no force moves: steadily or towards an end. It has nothing to do with what the wheel does.",
+            kind: Kind::LoadCell,
+            touches: &[Balance::Tyre, Balance::Wheel, Balance::Vehicle],
+            memory: Memory::Campaign,
+            sign: Sign::Either,
+            aliases: &[],
+            smallest: "a reading's noise, over the whole run",
+            smallest_size: |c| c.drag_sigma,
+            compensation: Compensation::By("takes the zero at the sample's time off the drag"),
+            carried: "by the clock: of each run, or of the whole campaign where it goes on through all runs",
+            example: Example {
+                form: "linear_in_run",
+                parameters: &[60.0],
+            },
         }
     }
 }

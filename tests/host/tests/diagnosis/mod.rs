@@ -3,48 +3,53 @@
 #![allow(dead_code, reason = "each test file uses its own share")]
 
 use std::collections::BTreeMap;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use host_sim::rig_file::RigFile;
 use host_sim::simulate::Scenario;
 use muslip_diagnose::campaign::Rig;
 use muslip_diagnose::mechanism::{Before, Context, Id};
 use muslip_diagnose::outcome::{
-    Alternative, BeforeAfter, ChannelNoise, Diagnosis, Estimate, Evidence, Fault, Figure, Fit,
-    Interval, LookedFor, MinimumDetectable, NamedMechanism, Recording, Region, Role, Score, Trace,
-    Unexplained, Verdict,
+    Alternative, BeforeAfter, ChainFinding, ChainWord, ChannelNoise, Diagnosis, Estimate, Evidence,
+    Fault, Figure, Fit, Interval, LookedFor, MinimumDetectable, NamedMechanism, Recording, Region,
+    Role, Score, Trace, Unexplained, Verdict,
 };
 use muslip_diagnose::repaired::{
     Correction, Domain, KnownRecording, NoiseModel, Repaired, RepairedParameter, RepairedTerm,
 };
 
-/// The contract's schema, where the sibling folder is present; a run of the CI must have it.
-pub fn schema() -> Option<serde_json::Value> {
+/// A file of the contract as the repository has it.
+pub fn contract(name: &str) -> String {
     let path = Path::new(env!("CARGO_MANIFEST_DIR"))
-        .join("../../../shared/contract/diagnosis.schema.json");
-    match std::fs::read_to_string(&path) {
-        Ok(text) => Some(serde_json::from_str(&text).expect("the schema is JSON")),
-        Err(_) => {
-            assert!(
-                std::env::var_os("CI").is_none(),
-                "the contract's schema is needed at {}",
-                path.display()
-            );
-            None
-        }
-    }
+        .join("../../docs/contract")
+        .join(name);
+    std::fs::read_to_string(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
 }
 
-/// Asserts that a text is a diagnosis by the contract's schema.
+/// A file of the contract as the folder beside the project has it, where that is present. `MUSLIP_SHARED` names
+/// the folder where it lies elsewhere.
+pub fn shared_contract(name: &str) -> Option<String> {
+    let beside = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared");
+    let shared = std::env::var_os("MUSLIP_SHARED").map_or(beside, PathBuf::from);
+    std::fs::read_to_string(shared.join("contract").join(name)).ok()
+}
+
+/// Asserts that a text is a diagnosis by the contract's schema: the repository's, and the one beside it.
 pub fn assert_valid(text: &str) {
+    const SCHEMA: &str = "diagnosis.schema.json";
     let value: serde_json::Value = serde_json::from_str(text).expect("diagnosis.json is JSON");
-    let Some(schema) = schema() else { return };
-    let validator = jsonschema::validator_for(&schema).expect("the schema is one");
-    let complaints: Vec<String> = validator
-        .iter_errors(&value)
-        .map(|error| format!("{}: {error}", error.instance_path))
-        .collect();
-    assert!(complaints.is_empty(), "{complaints:#?}");
+    for schema in [Some(contract(SCHEMA)), shared_contract(SCHEMA)]
+        .into_iter()
+        .flatten()
+    {
+        let schema = serde_json::from_str(&schema).expect("the schema is JSON");
+        let validator = jsonschema::validator_for(&schema).expect("the schema is one");
+        let complaints: Vec<String> = validator
+            .iter_errors(&value)
+            .map(|error| format!("{}: {error}", error.instance_path))
+            .collect();
+        assert!(complaints.is_empty(), "{complaints:#?}");
+    }
 }
 
 /// The rig file of [`rig`].
@@ -395,6 +400,7 @@ pub fn partly_explained() -> Diagnosis {
             end_s: 0.1,
             what: "frozen or clipped".into(),
         }],
+        chain: vec![],
         fit: Fit {
             fit: both,
             holdout: both,
@@ -563,5 +569,44 @@ impl Random {
     pub fn normal(&mut self) -> f64 {
         let radius = (-2.0 * (1.0 - self.uniform()).ln()).sqrt();
         radius * (std::f64::consts::TAU * self.uniform()).cos()
+    }
+}
+
+/// A diagnosis to which the measuring chain's findings are added: for one recording and for all.
+pub fn with_chain(diagnosis: Diagnosis) -> Diagnosis {
+    let finding = |recording: &str, channel: &str, finding, value, std, unit: &str, said: &str| {
+        ChainFinding {
+            recording: recording.into(),
+            channel: channel.into(),
+            relative_to: String::new(),
+            finding,
+            value,
+            std,
+            unit: unit.into(),
+            statement: said.into(),
+        }
+    };
+    Diagnosis {
+        chain: vec![
+            finding(
+                "*",
+                "vehicle_speed_m_s",
+                ChainWord::Late,
+                0.066,
+                0.004,
+                "s",
+                "the vehicle speed comes 66 ms later than the drag",
+            ),
+            finding(
+                "campaign/run02.csv",
+                "wheel_speed_rad_s",
+                ChainWord::ColouredNoise,
+                0.12,
+                f64::NAN,
+                "rad/s",
+                "the wheel speed's noise is correlated over 30 ms",
+            ),
+        ],
+        ..diagnosis
     }
 }

@@ -1,0 +1,297 @@
+//! What a mechanism says of itself to people and to what decides: the field guide's section, one type a mechanism.
+//!
+//! Every field is demanded, so that a mechanism cannot be added without any of it. What two mechanisms are mistaken
+//! for is said once, in the file of either; [`Id::aliases`] finds it from both.
+
+use super::{Balance, Context, Id, Mechanism, catalogue};
+
+/// Where a mechanism sits.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// The channels' own timing: not physics by the contract.
+    Chain,
+    /// The tyre and the road.
+    Tyre,
+    /// The load cell and what it is mounted on.
+    LoadCell,
+    /// The wheel, its brake and its speed sensor.
+    Wheel,
+    /// The vehicle.
+    Vehicle,
+}
+
+impl Kind {
+    /// In words.
+    #[must_use]
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Self::Chain => "measuring chain",
+            Self::Tyre => "tyre",
+            Self::LoadCell => "load cell",
+            Self::Wheel => "wheel",
+            Self::Vehicle => "vehicle",
+        }
+    }
+}
+
+/// What of the past acts now: what remembers is fed by other things that remember, and dearer to name.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Memory {
+    /// Only the present.
+    None,
+    /// The last second or less: a delay, a filter, a relaxation, a loop.
+    Kernel,
+    /// The run so far: heat.
+    Run,
+    /// All runs so far: wear, a zero that drifts.
+    Campaign,
+}
+
+impl Memory {
+    /// In words.
+    #[must_use]
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Self::None => "none",
+            Self::Kernel => "the last second or less",
+            Self::Run => "the run so far",
+            Self::Campaign => "the runs so far",
+        }
+    }
+}
+
+/// The sign that the size of the effect may have.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Sign {
+    /// Only as the contract counts it: no negative lag, no air that drives.
+    Positive,
+    /// Either.
+    Either,
+}
+
+impl Sign {
+    /// In words.
+    #[must_use]
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Self::Positive => "positive only",
+            Self::Either => "either",
+        }
+    }
+}
+
+/// Whether `muslip estimate --model` compensates a mechanism.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Compensation {
+    /// Yes: how.
+    By(&'static str),
+    /// No: why not.
+    Not(&'static str),
+}
+
+/// Two mechanisms that can be mistaken for each other, said by one of them.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Alias {
+    /// The other one.
+    pub with: Id,
+    /// What is alike, read from either side.
+    pub why: &'static str,
+    /// The run that tells them apart.
+    pub run: &'static str,
+}
+
+/// A size of the effect that a picture shows, on the guide's rig.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Example {
+    /// The form.
+    pub form: &'static str,
+    /// Its parameters.
+    pub parameters: &'static [f64],
+}
+
+/// The field guide's section of a mechanism, beside what [`Describe`](super::Describe) says already.
+#[derive(Clone, Copy, Debug)]
+pub struct Guide {
+    /// Its physics in two sentences.
+    pub physics: &'static str,
+    /// Where it sits.
+    pub kind: Kind,
+    /// All balances in whose residuals it shows.
+    pub touches: &'static [Balance],
+    /// What of the past acts now.
+    pub memory: Memory,
+    /// The sign that its size may have.
+    pub sign: Sign,
+    /// What it is mistaken for, where the other one does not say so.
+    pub aliases: &'static [Alias],
+    /// The smallest effect that matters, in words, ...
+    pub smallest: &'static str,
+    /// ... and as the size of the contract's first figure, in its unit.
+    pub smallest_size: fn(&Context) -> f64,
+    /// Whether the estimator compensates it.
+    pub compensation: Compensation,
+    /// How it is carried to a run that it was not fitted to: phase, order of runs, memory.
+    pub carried: &'static str,
+    /// What the guide's picture shows.
+    pub example: Example,
+}
+
+impl Id {
+    /// Its entries in the catalogue, one a form.
+    #[must_use]
+    pub fn entries(self) -> Vec<Box<dyn Mechanism<f64>>> {
+        let mut all = catalogue::<f64>();
+        all.retain(|entry| entry.id() == self);
+        all
+    }
+
+    /// Its section of the guide; `None` for an id without an entry, of which there is none.
+    #[must_use]
+    pub fn guide(self) -> Option<Guide> {
+        self.entries().first().map(|entry| entry.guide())
+    }
+
+    /// What it is mistaken for, whichever of the two says so.
+    #[must_use]
+    pub fn aliases(self) -> Vec<Alias> {
+        let mut found = Vec::new();
+        for &other in Self::ALL {
+            let said = other.guide().map_or(&[][..], |guide| guide.aliases);
+            if other == self {
+                found.extend_from_slice(said);
+            } else {
+                let of_self = said.iter().filter(|alias| alias.with == self);
+                found.extend(of_self.map(|alias| Alias {
+                    with: other,
+                    ..*alias
+                }));
+            }
+        }
+        found.sort_by_key(|alias| alias.with);
+        found
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What a descriptor must say, field by field: adding a field to [`Guide`] breaks this until it is judged here.
+    #[test]
+    fn every_descriptor_says_all_that_a_descriptor_must_say() {
+        for entry in catalogue::<f64>() {
+            let id = entry.id();
+            let word = id.as_str();
+            let Guide {
+                physics,
+                kind: _,
+                touches,
+                memory: _,
+                sign: _,
+                aliases,
+                smallest,
+                smallest_size,
+                compensation: Compensation::By(reason) | Compensation::Not(reason),
+                carried,
+                example,
+            } = entry.guide();
+            let sentences = physics.matches(". ").count() + 1;
+            assert_eq!(sentences, 2, "{word}: physics in two sentences");
+            assert!(physics.ends_with('.'), "{word}");
+            assert!(touches.contains(&id.balance()), "{word}: {touches:?}");
+            for text in [smallest, reason, carried, entry.equation()] {
+                assert!(text.len() >= 5, "{word}: {text:?}");
+            }
+            let size = smallest_size(&context());
+            assert!(size > 0.0 && size.is_finite(), "{word}: {size}");
+            for alias in aliases {
+                assert!(alias.why.ends_with('.') && alias.why.len() > 20, "{word}");
+                assert!(alias.run.ends_with('.') && alias.run.len() > 40, "{word}");
+            }
+            let shown = id.entries().into_iter().find(|e| e.form() == example.form);
+            let shown = shown.unwrap_or_else(|| panic!("{word} has no form {:?}", example.form));
+            let parameters = shown.parameters(&context());
+            assert_eq!(parameters.len(), example.parameters.len(), "{word}");
+            for (parameter, value) in parameters.iter().zip(example.parameters) {
+                assert!(
+                    (parameter.low..=parameter.high).contains(value),
+                    "{word}: {} = {value}",
+                    parameter.name
+                );
+            }
+        }
+    }
+
+    fn context() -> Context {
+        Context {
+            radius: 0.31,
+            inertia: 1.25,
+            mass: 420.0,
+            nominal: [0.85, 0.14],
+            mean_load: 4000.0,
+            mean_speed: 15.0,
+            max_speed: 20.0,
+            mean_wheel_speed: 45.0,
+            mean_power: 5e3,
+            total_work: 1e5,
+            mean_brake_power: 1e4,
+            dt: 0.002,
+            duration: 4.0,
+            total_time: 4.0,
+            runs: 1,
+            distance: 60.0,
+            drag_sigma: 30.0,
+            max_drag: 3500.0,
+            ..Context::default()
+        }
+    }
+
+    #[test]
+    fn every_id_has_an_entry_and_every_form_the_same_guide() {
+        for &id in Id::ALL {
+            let entries = id.entries();
+            assert!(!entries.is_empty(), "{}", id.as_str());
+            for entry in &entries {
+                assert_eq!(entry.guide().physics, entries[0].guide().physics);
+            }
+        }
+    }
+
+    #[test]
+    fn what_is_mistaken_for_another_is_so_from_both_sides_and_said_once() {
+        for &id in Id::ALL {
+            let aliases = id.aliases();
+            for (place, alias) in aliases.iter().enumerate() {
+                assert_ne!(alias.with, id);
+                let twice = aliases[place + 1..].iter().any(|a| a.with == alias.with);
+                assert!(!twice, "{} and {}", id.as_str(), alias.with.as_str());
+                let back = alias.with.aliases();
+                let back = back.iter().find(|a| a.with == id).unwrap();
+                assert_eq!((back.why, back.run), (alias.why, alias.run));
+            }
+        }
+    }
+
+    #[test]
+    fn nothing_stands_alone() {
+        for &id in Id::ALL {
+            assert!(!id.aliases().is_empty(), "{}", id.as_str());
+        }
+    }
+
+    #[test]
+    fn the_chain_is_the_contract_s_four_names() {
+        let chain: Vec<&str> = Id::ALL
+            .iter()
+            .filter(|id| id.guide().is_some_and(|guide| guide.kind == Kind::Chain))
+            .map(|id| id.as_str())
+            .collect();
+        let expected = [
+            "force_delay",
+            "force_lag",
+            "vehicle_speed_delay",
+            "wheel_speed_delay",
+        ];
+        assert_eq!(chain, expected);
+    }
+}

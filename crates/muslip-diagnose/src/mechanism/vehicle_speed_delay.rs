@@ -1,0 +1,97 @@
+//! The vehicle-speed channel reports late, relative to the other channels, by a fixed time.
+
+use super::speed_delay::{parameters, report, shift, starts, statement};
+use super::{
+    Alias, Balance, Compensation, Context, Describe, Evidence, Example, Guide, Id, Kind, Law,
+    Mechanism, Memory, Parameter, Reported, Sign, Stage, State,
+};
+use crate::number::Number;
+use crate::prepare::Series;
+
+/// Slowest speed that a shifted reading may come to while the wheel rolls, in m/s: slip divides by it.
+const SLOWEST_M_S: f64 = 0.5;
+
+/// The vehicle-speed channel reports late, relative to the other channels, by a fixed time.
+pub struct VehicleSpeedDelay;
+
+impl Describe for VehicleSpeedDelay {
+    fn id(&self) -> Id {
+        Id::VehicleSpeedDelay
+    }
+    fn stage(&self) -> Stage {
+        Stage::Kinematics
+    }
+    fn parameters(&self, context: &Context) -> Vec<Parameter> {
+        parameters(context)
+    }
+    fn starts(
+        &self,
+        context: &Context,
+        _series: &[Series],
+        _evidence: &[Evidence],
+    ) -> Vec<Vec<f64>> {
+        starts(context)
+    }
+    fn equation(&self) -> &'static str {
+        "measured v(t) = v(t - delay)"
+    }
+    fn statement(&self, reported: &[Reported<f64>], _p: &[f64]) -> String {
+        statement("vehicle speed", reported[0].value)
+    }
+    fn guide(&self) -> Guide {
+        Guide {
+            physics: "A satellite receiver, an optical sensor or a bus hands the vehicle speed on after a fixed time, while force and wheel are read at once. While the vehicle slows down the speed is then too high, and slip with it.",
+            kind: Kind::Chain,
+            touches: &[Balance::Tyre, Balance::Vehicle],
+            memory: Memory::Kernel,
+            sign: Sign::Either,
+            aliases: &[
+                Alias {
+                    with: Id::WheelSpeedDelay,
+                    why: "Slip is formed of both: one late is the other early.",
+                    run: "Tap the brake of the wheel at a held vehicle speed, then change the vehicle speed with the wheel rolling freely: each delay shows in the one that moves its own channel.",
+                },
+                Alias {
+                    with: Id::ForceDelay,
+                    why: "Only relative timing shows: a speed late against the force is the force early.",
+                    run: "Speed up and slow down in a freely rolling wheel, brake released: a late speed shows as slip in proportion to the acceleration, a force that is late shows nothing.",
+                },
+                Alias {
+                    with: Id::EffectiveRadius,
+                    why: "Under a constant deceleration a late speed is too high by a constant, as slip is with a wrong radius.",
+                    run: "Slow down in a freely rolling wheel, then hold the speed: a delay of a speed shows only while it changes, a wrong radius always.",
+                },
+            ],
+            smallest: "five milliseconds times the deceleration over the speed is the slip that it feigns",
+            smallest_size: |_| 0.005,
+            compensation: Compensation::Not(
+                "all other channels would have to wait for the late one, and the filter keeps no line of them",
+            ),
+            carried: "as it is, for the same instrument",
+            example: Example {
+                form: "",
+                parameters: &[0.06],
+            },
+        }
+    }
+}
+
+impl<T: Number> Mechanism<T> for VehicleSpeedDelay {
+    fn apply(&self, p: &[T], series: &Series, _context: &Context, state: &mut State<T>) {
+        shift(&mut state.speed, &series.speed, series, p[0]);
+        for (v, rolling) in state.speed.iter_mut().zip(&series.rolling) {
+            if *rolling && v.value() < SLOWEST_M_S {
+                *v = T::constant(SLOWEST_M_S);
+            }
+        }
+    }
+    fn report(
+        &self,
+        p: &[T],
+        _law: &Law<T>,
+        _context: &Context,
+        _series: &[Series],
+    ) -> Vec<Reported<T>> {
+        report(p)
+    }
+}
