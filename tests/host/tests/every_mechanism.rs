@@ -24,7 +24,7 @@ const SIGMA: f64 = 3.0;
 
 /// Campaigns in which the mechanism is named, but something beside it is said to be left that is not there:
 /// a known fault. In all others the verdict must be that nothing is left.
-const MORE_SAID_TO_BE_LEFT: &[&str] = &["grade_or_drive"];
+const MORE_SAID_TO_BE_LEFT: &[&str] = &["brake_fade", "grade_or_drive"];
 
 /// How a fresh run is to be predicted by the repaired model, beside the base law.
 #[derive(Clone, Copy, PartialEq, Eq)]

@@ -11,7 +11,7 @@ use crate::generate::rig::{Rig, RigKind};
 
 /// How the speed over the road, or of the drum, is measured.
 #[derive(Clone, Debug, Serialize, Deserialize)]
-#[serde(tag = "sensor", rename_all = "snake_case")]
+#[serde(rename_all = "snake_case")]
 pub enum VehicleSensor {
     /// The speed itself, with noise.
     Ideal,

@@ -10,7 +10,7 @@ use crate::generate::rig::{Rig, RigKind};
 
 /// How the wheel's speed is measured.
 #[derive(Clone, Debug, Serialize, Deserialize)]
-#[serde(tag = "sensor", rename_all = "snake_case")]
+#[serde(rename_all = "snake_case")]
 pub enum WheelSensor {
     /// The speed itself, with noise.
     Ideal,
