@@ -1,0 +1,162 @@
+//! The tyre's law as a clock: the drag follows the slip, so the delay of the speeds shows wherever slip moves.
+
+use super::constants::{FEWEST_BLOCKS, MOST_ROWS, WHEEL_RANGE_S, WHEEL_STEP_S};
+use super::finding::Timing;
+use super::recording::{Block, Recording, blocks};
+use super::signal::low_pass;
+use super::squares::{Balance, Estimate, colour_of, refine};
+use super::vehicle::{constants_of, powers};
+use crate::campaign::Rig;
+
+/// Places of the unknowns.
+pub const PEAK: usize = 0;
+/// Logarithm of the critical slip.
+pub const CRITICAL: usize = 1;
+/// Constant error of the slip.
+pub const OFFSET: usize = 2;
+/// Delay of the wheel speed, s.
+pub const WHEEL: usize = 3;
+/// Delay of the vehicle speed, s.
+pub const VEHICLE: usize = 4;
+/// Second moment by which the speeds are slower than the drag, s².
+pub const MOMENT: usize = 5;
+
+struct Law<'a> {
+    runs: &'a [Recording],
+    blocks: Vec<Block>,
+    rig: &'a Rig,
+    step: f64,
+    scale: f64,
+    vehicle: Timing,
+}
+
+/// Seconds read ahead of a block.
+const RUN_UP_S: f64 = 0.15;
+/// What is known of the vehicle speed's delay where no balance tells it, s.
+const VEHICLE_PRIOR_S: f64 = 0.04;
+
+impl Law<'_> {
+    /// Drag by the law and drag as read, on the block's grid.
+    fn series(&self, block: &Block, x: &[f64]) -> (Vec<f64>, Vec<f64>) {
+        let (slower, faster) = constants_of(x[MOMENT]);
+        let shift = faster - slower;
+        let run = &self.runs[block.run];
+        let ahead = (RUN_UP_S / self.step) as usize;
+        let start = block.start - ahead as f64 * self.step;
+        let count = block.count + ahead;
+        let omega = run.wheel.signal.means(start + x[WHEEL] + shift, self.step, count);
+        let speed = run.speed.signal.means(start + x[VEHICLE] + shift, self.step, count);
+        let load = run.load.signal.means(start + shift, self.step, count);
+        let critical = x[CRITICAL].exp();
+        let law: Vec<f64> = (0..count)
+            .map(|k| {
+                let v = speed[k].max(1e-3);
+                let s = 1.0 - self.rig.radius_m * omega[k] / v - x[OFFSET];
+                let u = s / critical;
+                load[k] * x[PEAK] * 2.0 * u / (1.0 + u * u)
+            })
+            .collect();
+        let law = low_pass(&law, self.step, faster);
+        let drag = low_pass(&run.drag.signal.means(start, self.step, count), self.step, slower);
+        (law[ahead..].to_vec(), drag[ahead..].to_vec())
+    }
+}
+
+impl Balance for Law<'_> {
+    fn residual(&self, x: &[f64]) -> Vec<Vec<f64>> {
+        self.blocks
+            .iter()
+            .map(|block| {
+                let (law, drag) = self.series(block, x);
+                drag.iter().zip(&law).map(|(d, l)| (d - l) / self.scale).collect()
+            })
+            .collect()
+    }
+
+    fn own(&self, x: &[f64]) -> Vec<Vec<Vec<f64>>> {
+        self.blocks
+            .iter()
+            .map(|block| {
+                let mut columns = powers(block.count, 2);
+                columns.push(self.series(block, x).0);
+                columns
+            })
+            .collect()
+    }
+
+    fn steps(&self) -> Vec<f64> {
+        vec![1e-3, 1e-3, 1e-4, 5e-4, 1e-3, 2.5e-5]
+    }
+
+    fn prior(&self) -> Vec<(f64, f64)> {
+        let vehicle = if self.vehicle.std.is_finite() {
+            (self.vehicle.value, self.vehicle.std)
+        } else {
+            (0.0, VEHICLE_PRIOR_S)
+        };
+        vec![
+            (self.rig.peak_friction, 0.3 * self.rig.peak_friction),
+            (self.rig.critical_slip.ln(), 0.4),
+            (0.0, 0.01),
+            (0.0, 0.1),
+            vehicle,
+            (0.0, 1e-3),
+        ]
+    }
+}
+
+/// What the law says, given what is known of the vehicle speed.
+#[must_use]
+pub fn law(rig: &Rig, runs: &[Recording], vehicle: Timing) -> Option<Estimate> {
+    if !(rig.radius_m > 0.0 && rig.peak_friction > 0.0 && rig.critical_slip > 0.0) {
+        return None;
+    }
+    let stretches: Vec<(usize, f64, f64)> = runs
+        .iter()
+        .enumerate()
+        .flat_map(|(r, run)| run.moving.iter().map(move |m| (r, run.time[m.start], run.time[m.end - 1])))
+        .collect();
+    let whole: f64 = stretches.iter().map(|(_, a, b)| b - a).sum();
+    let step = WHEEL_STEP_S.max(whole / MOST_ROWS as f64);
+    let (mut sum, mut count) = (0.0, 0.0);
+    for run in runs {
+        for k in run.moving.iter().flat_map(Clone::clone) {
+            sum += run.load.clean[k].abs();
+            count += 1.0;
+        }
+    }
+    let balance = Law {
+        runs,
+        blocks: blocks(&stretches, step, (0.05, 0.15), (FEWEST_BLOCKS, 12.0, 0.8)),
+        rig,
+        step,
+        scale: sum / f64::max(count, 1.0),
+        vehicle,
+    };
+    if balance.blocks.is_empty() || !(balance.scale > 0.0) {
+        return None;
+    }
+    let start = coarse(&balance)?;
+    let mut at = refine(&balance, &start, &[0.6], 3, &[false, false, false, false, false, true])?;
+    for _ in 0..3 {
+        let colour = colour_of(&balance, &at.unknowns);
+        at = refine(&balance, &at.unknowns, &colour, 4, &[false; 6])?;
+    }
+    Some(at)
+}
+
+/// The best of a scan over the wheel speed's delay, the law refitted at each.
+fn coarse(balance: &Law) -> Option<Vec<f64>> {
+    let prior = balance.prior();
+    let step = 0.02;
+    let count = ((WHEEL_RANGE_S.1 - WHEEL_RANGE_S.0) / step).round() as usize;
+    (0..=count)
+        .filter_map(|k| {
+            let mut x: Vec<f64> = prior.iter().map(|p| p.0).collect();
+            x[WHEEL] = WHEEL_RANGE_S.0 + k as f64 * step;
+            let fixed = [false, false, true, false, true, true];
+            refine(balance, &x, &[0.6], 3, &fixed)
+        })
+        .min_by(|a, b| a.sum.total_cmp(&b.sum))
+        .map(|estimate| estimate.unknowns)
+}

@@ -1,0 +1,99 @@
+//! Which speed is late, and by how much, from all balances.
+
+use super::constants::{LEAST_DELAY_S, STEP_SHARE, TOLD_SIGMAS, UNKNOWN_DELAY_S};
+use super::finding::{Finding, Timing, Word};
+use super::law;
+use super::recording::Recording;
+use super::squares::Estimate;
+use super::vehicle::vehicle;
+use super::wheel::wheel;
+use crate::campaign::Rig;
+use crate::smooth::median_in_place;
+
+/// Delays against the drag, and by what filter channels are slower than it.
+#[derive(Clone, Debug, Default)]
+pub struct Timings {
+    /// Of the wheel speed.
+    pub wheel: Timing,
+    /// Of the vehicle speed.
+    pub vehicle: Timing,
+    /// Of the brake column.
+    pub brake: Timing,
+    /// Second moment by which the vehicle speed is slower than the drag, s², and its standard deviation.
+    pub vehicle_moment: Option<(f64, f64)>,
+    /// Second moment by which the wheel speed is slower than the drag, s², and its standard deviation.
+    pub wheel_moment: Option<(f64, f64)>,
+    /// What each balance said, for a closer look: vehicle, wheel, law.
+    pub estimates: [Option<Estimate>; 3],
+}
+
+/// An estimate's unknown as a delay, with half a period where the channel is held and at least the sampler's doubt.
+fn delay(estimate: &Estimate, place: usize, held: f64, step: f64) -> Timing {
+    let std = estimate.std[place].hypot(STEP_SHARE * step);
+    if !(std < UNKNOWN_DELAY_S) || !estimate.unknowns[place].is_finite() {
+        return Timing::UNKNOWN;
+    }
+    Timing { value: estimate.unknowns[place] + 0.5 * held, std }
+}
+
+fn median_of(runs: &[Recording], pick: impl Fn(&Recording) -> f64) -> f64 {
+    let mut values: Vec<f64> = runs.iter().map(pick).collect();
+    if values.is_empty() { 0.0 } else { median_in_place(&mut values) }
+}
+
+/// All delays.
+#[must_use]
+pub fn timings(rig: &Rig, runs: &[Recording]) -> Timings {
+    let mut out = Timings::default();
+    let step = median_of(runs, |run| run.step);
+    let held_wheel = median_of(runs, |run| run.wheel.hold.map_or(0.0, |h| h.period_s));
+    let held_speed = median_of(runs, |run| run.speed.hold.map_or(0.0, |h| h.period_s));
+    if rig.coasting && let Some(estimate) = vehicle(runs, rig.mass_kg) {
+        out.vehicle = delay(&estimate, 1, held_speed, step);
+        out.vehicle_moment = Some((estimate.unknowns[2], estimate.std[2]));
+        out.estimates[0] = Some(estimate);
+    }
+    if let Some(estimate) = wheel(rig, runs) {
+        out.wheel = delay(&estimate, 2, held_wheel, step);
+        out.brake = delay(&estimate, 3, 0.0, step);
+        out.wheel_moment = Some((estimate.unknowns[4], estimate.std[4]));
+        out.estimates[1] = Some(estimate);
+    }
+    let known = Timing { value: out.vehicle.value - 0.5 * held_speed, ..out.vehicle };
+    if let Some(estimate) = law::law(rig, runs, known) {
+        out.wheel = out.wheel.with(delay(&estimate, law::WHEEL, held_wheel, step));
+        if !out.vehicle.std.is_finite() {
+            out.vehicle = delay(&estimate, law::VEHICLE, held_speed, step);
+        }
+        out.wheel_moment = Some((estimate.unknowns[law::MOMENT], estimate.std[law::MOMENT]));
+        out.estimates[2] = Some(estimate);
+    }
+    out
+}
+
+/// The delays that are worth a sentence.
+#[must_use]
+pub fn findings(timings: &Timings, brake: &str) -> Vec<Finding> {
+    [
+        ("wheel_speed_rad_s", timings.wheel),
+        ("vehicle_speed_m_s", timings.vehicle),
+        (brake, timings.brake),
+    ]
+    .into_iter()
+    .filter(|(channel, timing)| {
+        !channel.is_empty() && timing.std.is_finite() && timing.value.abs() > LEAST_DELAY_S.max(TOLD_SIGMAS * timing.std)
+    })
+    .map(|(channel, timing)| {
+        let how = if timing.value > 0.0 { "late" } else { "early" };
+        let said = format!(
+            "{channel} is {:.1} ms {how} (std {:.1} ms) against the drag channel.",
+            1e3 * timing.value.abs(),
+            1e3 * timing.std
+        );
+        Finding {
+            relative_to: "drag_force_n".to_owned(),
+            ..Finding::of(channel, Word::Late, (timing.value, timing.std), "s").saying(said)
+        }
+    })
+    .collect()
+}

@@ -1,0 +1,121 @@
+//! The wheel's balance in level form: J ω(t) against the impulses of drag and brake.
+
+use super::constants::{COARSE_STEP_S, FEWEST_BLOCKS, MOST_ROWS, WHEEL_RANGE_S, WHEEL_STEP_S};
+use super::recording::{Block, Recording, blocks};
+use super::signal::low_pass;
+use super::squares::{Balance, Estimate, colour_of, refine, scan_value};
+use super::vehicle::{constants_of, powers};
+use crate::campaign::Rig;
+
+/// Unknowns: scale of the drag's and of the brake's impulse, delay of ω and of the brake in s, second moment by which
+/// ω is slower in s².
+struct Wheel<'a> {
+    runs: &'a [Recording],
+    blocks: Vec<Block>,
+    rig: &'a Rig,
+    step: f64,
+}
+
+/// Seconds read ahead of a block.
+const RUN_UP_S: f64 = 0.15;
+
+impl Balance for Wheel<'_> {
+    fn residual(&self, x: &[f64]) -> Vec<Vec<f64>> {
+        let (slower, faster) = constants_of(x[4]);
+        let shift = x[2] - slower + faster;
+        let ahead = (RUN_UP_S / self.step) as usize;
+        self.blocks
+            .iter()
+            .map(|block| {
+                let run = &self.runs[block.run];
+                let start = block.start - ahead as f64 * self.step;
+                let count = block.count + ahead;
+                let drag = run.drag.signal.levels(start - shift, self.step, count);
+                let brake = run.brake.as_ref().map_or_else(
+                    || vec![0.0; count],
+                    |(_, b)| b.signal.levels(start - shift + x[3], self.step, count),
+                );
+                let (a, b) = (x[0] * self.rig.radius_m, x[1]);
+                let level: Vec<f64> = drag
+                    .iter()
+                    .zip(&brake)
+                    .map(|(f, t)| (a * (f - drag[0]) - b * (t - brake[0])) / self.rig.wheel_inertia_kg_m2)
+                    .collect();
+                let level = low_pass(&level, self.step, slower);
+                let omega = low_pass(&run.wheel.signal.means(start, self.step, count), self.step, faster);
+                (ahead..count).map(|k| omega[k] - level[k]).collect()
+            })
+            .collect()
+    }
+
+    fn own(&self, _: &[f64]) -> Vec<Vec<Vec<f64>>> {
+        self.blocks.iter().map(|block| powers(block.count, 3)).collect()
+    }
+
+    fn steps(&self) -> Vec<f64> {
+        vec![1e-3, 1e-3, 5e-4, 5e-4, 2.5e-5]
+    }
+
+    fn prior(&self) -> Vec<(f64, f64)> {
+        vec![(1.0, 0.3), (1.0, 0.3), (0.0, f64::INFINITY), (0.0, f64::INFINITY), (0.0, 1e-3)]
+    }
+}
+
+/// Stretches in which the wheel turns and moves freely of its stop, in s.
+fn turning(rig: &Rig, runs: &[Recording]) -> Vec<(usize, f64, f64)> {
+    let mut out = Vec::new();
+    for (r, run) in runs.iter().enumerate().filter(|(_, run)| run.brake.is_some()) {
+        for moving in &run.moving {
+            let mut from = None;
+            for k in moving.clone() {
+                let free = run.wheel.clean[k] * rig.radius_m > 0.05 * run.speed.clean[k];
+                if free && from.is_none() {
+                    from = Some(k);
+                }
+                if let Some(start) = from
+                    && (!free || k + 1 == moving.end)
+                {
+                    out.push((r, run.time[start], run.time[k]));
+                    from = None;
+                }
+            }
+        }
+    }
+    out
+}
+
+/// What the balance says.
+#[must_use]
+pub fn wheel(rig: &Rig, runs: &[Recording]) -> Option<Estimate> {
+    if !(rig.wheel_inertia_kg_m2 > 0.0 && rig.radius_m > 0.0) {
+        return None;
+    }
+    let stretches = turning(rig, runs);
+    let whole: f64 = stretches.iter().map(|(_, a, b)| b - a).sum();
+    let step = WHEEL_STEP_S.max(whole / MOST_ROWS as f64);
+    let balance = Wheel {
+        runs,
+        blocks: blocks(&stretches, step, (0.08, 0.08), (FEWEST_BLOCKS, 2.0, 0.3)),
+        rig,
+        step,
+    };
+    if balance.blocks.is_empty() {
+        return None;
+    }
+    let count = ((WHEEL_RANGE_S.1 - WHEEL_RANGE_S.0) / COARSE_STEP_S).round() as usize;
+    let best = (0..=count)
+        .filter_map(|k| {
+            let delay = WHEEL_RANGE_S.0 + k as f64 * COARSE_STEP_S;
+            let value = scan_value(&balance, &[1.0, 1.0, delay, 0.0, 0.0], &[0.98]);
+            value.is_finite().then_some((value, delay))
+        })
+        .min_by(|a, b| a.0.total_cmp(&b.0))?
+        .1;
+    let start = [1.0, 1.0, best, 0.0, 0.0];
+    let mut at = refine(&balance, &start, &[0.98], 4, &[false, false, false, false, true])?;
+    for _ in 0..3 {
+        let colour = colour_of(&balance, &at.unknowns);
+        at = refine(&balance, &at.unknowns, &colour, 4, &[false; 5])?;
+    }
+    Some(at)
+}
