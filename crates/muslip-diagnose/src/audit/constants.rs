@@ -11,7 +11,7 @@ pub const WHEEL_RANGE_S: (f64, f64) = (-0.07, 0.07);
 /// Steps of the coarse scans, s: half the width of the valleys that the refinement falls into.
 pub const COARSE_STEP_S: f64 = 0.010;
 /// Most rows a balance uses; longer campaigns are thinned by runs.
-pub const MOST_ROWS: usize = 12_000;
+pub const MOST_ROWS: usize = 6_000;
 /// Order of the autoregression that whitens a balance's residual.
 pub const WHITENING_ORDER: usize = 6;
 /// Fewest stretches that the spread of a delay is judged by; runs are cut until there are as many.
@@ -36,3 +36,7 @@ pub const HELD_STEPS: usize = 8;
 pub const HELD_REPEATS: f64 = 0.35;
 /// Share of renewals that come in step, at least.
 pub const HELD_REGULAR: f64 = 0.85;
+/// Standard deviation of what is expected of the second moment between two channels of a rig, s²: filters of 12 Hz.
+pub const MOMENT_S2: f64 = 1.5e-4;
+/// Width over which the vehicle's speed is averaged in the tyre's law, s: what is quicker is the drag's impulse.
+pub const SPEED_WIDTH_S: f64 = 0.25;

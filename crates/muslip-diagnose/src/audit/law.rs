@@ -1,9 +1,9 @@
 //! The tyre's law as a clock: the drag follows the slip, so the delay of the speeds shows wherever slip moves.
 
-use super::constants::{FEWEST_BLOCKS, MOST_ROWS, WHEEL_RANGE_S, WHEEL_STEP_S};
+use super::constants::{MOMENT_S2, SPEED_WIDTH_S, FEWEST_BLOCKS, MOST_ROWS, WHEEL_RANGE_S, WHEEL_STEP_S};
 use super::finding::Timing;
 use super::recording::{Block, Recording, blocks};
-use super::signal::low_pass;
+use super::signal::{Signal, low_pass};
 use super::squares::{Balance, Estimate, colour_of, refine};
 use super::vehicle::{constants_of, powers};
 use crate::campaign::Rig;
@@ -28,25 +28,34 @@ struct Law<'a> {
     step: f64,
     scale: f64,
     vehicle: Timing,
+    /// Vehicle speed of each run, smoothed and, where its delay is known, in step with the drag.
+    speeds: Vec<Signal>,
 }
 
 /// Seconds read ahead of a block.
 const RUN_UP_S: f64 = 0.15;
+/// Width over which speeds and load are averaged for the instruments, s.
+const INSTRUMENT_S: f64 = 0.06;
 /// What is known of the vehicle speed's delay where no balance tells it, s.
 const VEHICLE_PRIOR_S: f64 = 0.04;
 
 impl Law<'_> {
-    /// Drag by the law and drag as read, on the block's grid.
-    fn series(&self, block: &Block, x: &[f64]) -> (Vec<f64>, Vec<f64>) {
+    /// Drag by the law and drag as read, on the block's grid; inputs are means over a width in s.
+    fn series(&self, block: &Block, x: &[f64], width: f64) -> (Vec<f64>, Vec<f64>) {
         let (slower, faster) = constants_of(x[MOMENT]);
         let shift = faster - slower;
         let run = &self.runs[block.run];
         let ahead = (RUN_UP_S / self.step) as usize;
         let start = block.start - ahead as f64 * self.step;
         let count = block.count + ahead;
-        let omega = run.wheel.signal.means(start + x[WHEEL] + shift, self.step, count);
-        let speed = run.speed.signal.means(start + x[VEHICLE] + shift, self.step, count);
-        let load = run.load.signal.means(start + shift, self.step, count);
+        let omega = run.wheel.signal.averages(start + x[WHEEL] + shift, self.step, count, width);
+        let speed = self.speeds[block.run].averages(
+            start + x[VEHICLE] + shift - self.vehicle.value,
+            self.step,
+            count,
+            width,
+        );
+        let load = run.load.signal.averages(start + shift, self.step, count, width);
         let critical = x[CRITICAL].exp();
         let law: Vec<f64> = (0..count)
             .map(|k| {
@@ -67,10 +76,22 @@ impl Balance for Law<'_> {
         self.blocks
             .iter()
             .map(|block| {
-                let (law, drag) = self.series(block, x);
+                let (law, drag) = self.series(block, x, self.step);
                 drag.iter().zip(&law).map(|(d, l)| (d - l) / self.scale).collect()
             })
             .collect()
+    }
+
+    fn instrument(&self, _: &[f64], x: &[f64]) -> Option<Vec<Vec<f64>>> {
+        Some(
+            self.blocks
+                .iter()
+                .map(|block| {
+                    let (law, _) = self.series(block, x, INSTRUMENT_S.max(self.step));
+                    law.iter().map(|l| -l / self.scale).collect()
+                })
+                .collect(),
+        )
     }
 
     fn own(&self, x: &[f64]) -> Vec<Vec<Vec<f64>>> {
@@ -78,7 +99,7 @@ impl Balance for Law<'_> {
             .iter()
             .map(|block| {
                 let mut columns = powers(block.count, 2);
-                columns.push(self.series(block, x).0);
+                columns.push(self.series(block, x, INSTRUMENT_S).0);
                 columns
             })
             .collect()
@@ -97,12 +118,37 @@ impl Balance for Law<'_> {
         vec![
             (self.rig.peak_friction, 0.3 * self.rig.peak_friction),
             (self.rig.critical_slip.ln(), 0.4),
-            (0.0, 0.01),
+            (0.0, 0.005),
             (0.0, 0.1),
             vehicle,
-            (0.0, 1e-3),
+            (0.0, MOMENT_S2),
         ]
     }
+}
+
+/// The vehicle's speed smoothed. Where it coasts its quick changes are the drag's impulse: only the rest is smoothed.
+fn speed(rig: &Rig, run: &Recording, vehicle: Timing) -> Signal {
+    let count = run.time.len();
+    let (Some(first), Some(last)) = (run.time.first(), run.time.last()) else {
+        return Signal::default();
+    };
+    let step = ((last - first) / count.max(2) as f64).max(1e-4);
+    let times: Vec<f64> = (0..count).map(|k| first + k as f64 * step).collect();
+    if !vehicle.std.is_finite() {
+        return Signal::new(&times, &run.speed.signal.averages(*first, step, count, SPEED_WIDTH_S));
+    }
+    let speed = run.speed.signal.means(first + vehicle.value, step, count);
+    let impulse: Vec<f64> = run
+        .drag
+        .signal
+        .levels(*first, step, count)
+        .iter()
+        .map(|i| i / rig.mass_kg)
+        .collect();
+    let rest: Vec<f64> = speed.iter().zip(&impulse).map(|(v, i)| v + i).collect();
+    let rest = Signal::new(&times, &rest).averages(*first, step, count, SPEED_WIDTH_S);
+    let rebuilt: Vec<f64> = rest.iter().zip(&impulse).map(|(v, i)| v - i).collect();
+    Signal::new(&times, &rebuilt)
 }
 
 /// What the law says, given what is known of the vehicle speed.
@@ -132,15 +178,17 @@ pub fn law(rig: &Rig, runs: &[Recording], vehicle: Timing) -> Option<Estimate> {
         step,
         scale: sum / f64::max(count, 1.0),
         vehicle,
+        speeds: runs.iter().map(|run| speed(rig, run, vehicle)).collect(),
     };
     if balance.blocks.is_empty() || !(balance.scale > 0.0) {
         return None;
     }
     let start = coarse(&balance)?;
-    let mut at = refine(&balance, &start, &[0.6], 3, &[false, false, false, false, false, true])?;
+    let known = vehicle.std.is_finite();
+    let mut at = refine(&balance, &start, &[0.6], 3, &[false, false, false, false, known, true])?;
     for _ in 0..3 {
         let colour = colour_of(&balance, &at.unknowns);
-        at = refine(&balance, &at.unknowns, &colour, 4, &[false; 6])?;
+        at = refine(&balance, &at.unknowns, &colour, 4, &[false, false, false, false, known, true])?;
     }
     Some(at)
 }

@@ -79,6 +79,22 @@ impl Signal {
             .collect()
     }
 
+    /// Means over a width around such steps.
+    #[must_use]
+    pub fn averages(&self, start: f64, step: f64, count: usize, width: f64) -> Vec<f64> {
+        if self.is_empty() {
+            return vec![0.0; count];
+        }
+        let (mut first, mut second) = (0, 0);
+        (0..count)
+            .map(|k| {
+                let here = start + k as f64 * step;
+                let before = self.integral_at(here - 0.5 * width, &mut first);
+                (self.integral_at(here + 0.5 * width, &mut second) - before) / width
+            })
+            .collect()
+    }
+
     /// Means of the integral over such steps, by Simpson's rule.
     #[must_use]
     pub fn levels(&self, start: f64, step: f64, count: usize) -> Vec<f64> {

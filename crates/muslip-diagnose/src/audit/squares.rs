@@ -9,6 +9,10 @@ use super::constants::WHITENING_ORDER;
 pub trait Balance {
     /// Residuals, one vector a stretch.
     fn residual(&self, unknowns: &[f64]) -> Vec<Vec<f64>>;
+    /// Residuals from which the slopes are taken that the residuals are weighed by; where the inputs are noisy, of
+    /// smoothed ones (instruments), so that the inputs' noise does not pull at the unknowns. The slopes are taken
+    /// around `base`.
+    fn instrument(&self, base: &[f64], unknowns: &[f64]) -> Option<Vec<Vec<f64>>>;
     /// Columns that each stretch may have any share of (its zero, its drift, ...), constant in the unknowns.
     fn own(&self, unknowns: &[f64]) -> Vec<Vec<Vec<f64>>>;
     /// Steps for derivatives.
@@ -198,31 +202,34 @@ pub fn refine(
             return None;
         }
         let variance = (sum / rows as f64).max(1e-300);
-        let slopes: Vec<Vec<Vec<f64>>> = free
-            .iter()
-            .map(|&i| {
-                let mut moved = unknowns.clone();
-                moved[i] += steps[i];
-                let moved = whitener.apply(&balance.residual(&moved));
-                moved
-                    .iter()
-                    .zip(&white)
-                    .map(|(m, w)| m.iter().zip(w).map(|(m, w)| (m - w) / steps[i]).collect())
-                    .collect()
-            })
-            .collect();
-        let blocks = block_sums(&white, &slopes, variance);
+        let slopes = slopes(|x| Some(balance.residual(x)), &whitener, &unknowns, &steps, &free)?;
+        let smooth = self::slopes(|x| balance.instrument(&unknowns, x), &whitener, &unknowns, &steps, &free);
+        let instrumental = smooth.is_some();
+        let weights = smooth.as_ref().unwrap_or(&slopes);
+        let blocks = block_sums(&white, weights, &slopes, variance);
         let (matrix, vector) = total(&blocks, &unknowns, &prior, &free);
         let inverse = matrix.clone().try_inverse()?;
         let step = &inverse * &vector;
         last = Some(Estimate {
-            std: spread(&inverse, &blocks, &free, unknowns.len()),
+            std: spread(&inverse, &blocks, (&unknowns, &prior), &free),
             unknowns: unknowns.clone(),
             sum,
             rows,
         });
         if pass == passes {
             break;
+        }
+        if instrumental {
+            // No sum falls along an instrument's way: short steps instead.
+            let longest = free
+                .iter()
+                .enumerate()
+                .map(|(place, &i)| (step[place] / (LONGEST_STEP * steps[i])).abs())
+                .fold(1.0, f64::max);
+            for (place, &i) in free.iter().enumerate() {
+                unknowns[i] -= step[place] / longest;
+            }
+            continue;
         }
         let before = sum / variance + penalty(&unknowns, &prior);
         let mut share = 1.0;
@@ -252,66 +259,113 @@ pub fn refine(
     last
 }
 
-type Sums = (DMatrix<f64>, DVector<f64>);
+/// Longest step of an instrumental pass, in the steps of the derivatives.
+const LONGEST_STEP: f64 = 40.0;
 
-fn block_sums(white: &[Vec<f64>], slopes: &[Vec<Vec<f64>>], variance: f64) -> Vec<Sums> {
-    let count = slopes.len();
-    (0..white.len())
-        .map(|b| {
-            let matrix = DMatrix::from_fn(count, count, |i, j| {
-                if j < i {
-                    0.0
-                } else {
-                    dot(&slopes[i][b], &slopes[j][b]) / variance
-                }
-            });
-            let full = DMatrix::from_fn(count, count, |i, j| matrix[(i.min(j), i.max(j))]);
-            let vector =
-                DVector::from_fn(count, |i, _| dot(&slopes[i][b], &white[b]) / variance);
-            (full, vector)
+/// Whitened slopes of a residual in the free unknowns.
+fn slopes(
+    residual: impl Fn(&[f64]) -> Option<Vec<Vec<f64>>>,
+    whitener: &Whitener,
+    unknowns: &[f64],
+    steps: &[f64],
+    free: &[usize],
+) -> Option<Vec<Vec<Vec<f64>>>> {
+    let here = whitener.apply(&residual(unknowns)?);
+    free.iter()
+        .map(|&i| {
+            let mut moved = unknowns.to_vec();
+            moved[i] += steps[i];
+            let moved = whitener.apply(&residual(&moved)?);
+            Some(
+                moved
+                    .iter()
+                    .zip(&here)
+                    .map(|(m, h)| m.iter().zip(h).map(|(m, h)| (m - h) / steps[i]).collect())
+                    .collect(),
+            )
         })
         .collect()
 }
 
-fn total(blocks: &[Sums], unknowns: &[f64], prior: &[(f64, f64)], free: &[usize]) -> Sums {
+/// A stretch's share of the normal equations: weights by slopes, weights by weights, weights by residuals.
+struct Sums {
+    slopes: DMatrix<f64>,
+    weights: DMatrix<f64>,
+    pull: DVector<f64>,
+}
+
+fn block_sums(
+    white: &[Vec<f64>],
+    weights: &[Vec<Vec<f64>>],
+    slopes: &[Vec<Vec<f64>>],
+    variance: f64,
+) -> Vec<Sums> {
+    let count = slopes.len();
+    (0..white.len())
+        .map(|b| Sums {
+            slopes: DMatrix::from_fn(count, count, |i, j| dot(&weights[i][b], &slopes[j][b]) / variance),
+            weights: DMatrix::from_fn(count, count, |i, j| dot(&weights[i][b], &weights[j][b]) / variance),
+            pull: DVector::from_fn(count, |i, _| dot(&weights[i][b], &white[b]) / variance),
+        })
+        .collect()
+}
+
+fn prior_weight(std: f64) -> f64 {
+    if std.is_finite() { std.powi(-2) } else { 0.0 }
+}
+
+fn total(
+    blocks: &[Sums],
+    unknowns: &[f64],
+    prior: &[(f64, f64)],
+    free: &[usize],
+) -> (DMatrix<f64>, DVector<f64>) {
     let count = free.len();
     let mut matrix = DMatrix::zeros(count, count);
     let mut vector = DVector::zeros(count);
-    for (m, v) in blocks {
-        matrix += m;
-        vector += v;
+    for block in blocks {
+        matrix += &block.slopes;
+        vector += &block.pull;
     }
     for (place, &i) in free.iter().enumerate() {
         let (mean, std) = prior[i];
-        let weight = if std.is_finite() { std.powi(-2) } else { 0.0 };
-        matrix[(place, place)] += weight;
-        vector[place] += weight * (unknowns[i] - mean);
+        matrix[(place, place)] += prior_weight(std);
+        vector[place] += prior_weight(std) * (unknowns[i] - mean);
         matrix[(place, place)] *= 1.0 + 1e-12;
     }
     (matrix, vector)
 }
 
 /// Standard deviations: the larger of what white residuals allow and what the stretches' own pulls show.
-fn spread(inverse: &DMatrix<f64>, blocks: &[Sums], free: &[usize], all: usize) -> Vec<f64> {
+fn spread(
+    inverse: &DMatrix<f64>,
+    blocks: &[Sums],
+    (unknowns, prior): (&[f64], &[(f64, f64)]),
+    free: &[usize],
+) -> Vec<f64> {
     let count = blocks.len() as f64;
-    let mut mean = DVector::zeros(free.len());
-    for (_, v) in blocks {
-        mean += v / count.max(1.0);
+    let size = free.len();
+    let (mut white, mut mean) = (DMatrix::zeros(size, size), DVector::zeros(size));
+    for block in blocks {
+        white += &block.weights;
+        mean += &block.pull / count.max(1.0);
     }
-    let mut meat = DMatrix::zeros(free.len(), free.len());
-    for (_, v) in blocks {
-        let off = v - &mean;
-        meat += &off * off.transpose();
+    let mut pulls = DMatrix::zeros(size, size);
+    for block in blocks {
+        let off = &block.pull - &mean;
+        pulls += &off * off.transpose();
     }
-    let sandwich = inverse * meat * inverse * (count / (count - 1.0).max(1.0));
-    let mut std = vec![0.0; all];
+    pulls *= count / (count - 1.0).max(1.0);
     for (place, &i) in free.iter().enumerate() {
-        let white = inverse[(place, place)].max(0.0);
-        let pulls = if count > 1.0 {
-            sandwich[(place, place)].max(0.0)
-        } else {
-            4.0 * white
-        };
+        white[(place, place)] += prior_weight(prior[i].1);
+        pulls[(place, place)] += prior_weight(prior[i].1);
+    }
+    let turned = inverse.transpose();
+    let (white, pulls) = (inverse * white * &turned, inverse * pulls * &turned);
+    let mut std = vec![0.0; unknowns.len()];
+    for (place, &i) in free.iter().enumerate() {
+        let white = white[(place, place)].max(0.0);
+        let pulls = if count > 1.0 { pulls[(place, place)].max(0.0) } else { 4.0 * white };
         std[i] = white.max(pulls).sqrt();
     }
     std

@@ -49,6 +49,10 @@ impl Balance for Vehicle<'_> {
             .collect()
     }
 
+    fn instrument(&self, _: &[f64], _: &[f64]) -> Option<Vec<Vec<f64>>> {
+        None
+    }
+
     fn own(&self, _: &[f64]) -> Vec<Vec<Vec<f64>>> {
         self.blocks.iter().map(|block| powers(block.count, 3)).collect()
     }

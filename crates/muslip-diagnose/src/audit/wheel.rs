@@ -1,13 +1,13 @@
 //! The wheel's balance in level form: J ω(t) against the impulses of drag and brake.
 
-use super::constants::{COARSE_STEP_S, FEWEST_BLOCKS, MOST_ROWS, WHEEL_RANGE_S, WHEEL_STEP_S};
+use super::constants::{MOMENT_S2, COARSE_STEP_S, FEWEST_BLOCKS, MOST_ROWS, WHEEL_RANGE_S, WHEEL_STEP_S};
 use super::recording::{Block, Recording, blocks};
 use super::signal::low_pass;
 use super::squares::{Balance, Estimate, colour_of, refine, scan_value};
 use super::vehicle::{constants_of, powers};
 use crate::campaign::Rig;
 
-/// Unknowns: scale of the drag's and of the brake's impulse, delay of ω and of the brake in s, second moment by which
+/// Unknowns: scale of both impulses, the brake's against the drag's, delay of ω and of the brake in s, second moment by which
 /// ω is slower in s².
 struct Wheel<'a> {
     runs: &'a [Recording],
@@ -18,34 +18,53 @@ struct Wheel<'a> {
 
 /// Seconds read ahead of a block.
 const RUN_UP_S: f64 = 0.15;
+/// Width over which the wheel speed is averaged for the instruments, s.
+const INSTRUMENT_S: f64 = 0.04;
 
-impl Balance for Wheel<'_> {
-    fn residual(&self, x: &[f64]) -> Vec<Vec<f64>> {
+impl Wheel<'_> {
+    fn each(&self, of: impl Fn(&Recording, &Block) -> Vec<f64>) -> Vec<Vec<f64>> {
+        self.blocks.iter().map(|block| of(&self.runs[block.run], block)).collect()
+    }
+
+    /// Wheel speed less both impulses; where a delay is given, the impulses' sum is that wheel speed smoothed, so that
+    /// the force channels' noise is not in it.
+    fn imbalance(&self, run: &Recording, block: &Block, x: &[f64], smoothed: Option<&[f64]>) -> Vec<f64> {
         let (slower, faster) = constants_of(x[4]);
         let shift = x[2] - slower + faster;
         let ahead = (RUN_UP_S / self.step) as usize;
-        self.blocks
-            .iter()
-            .map(|block| {
-                let run = &self.runs[block.run];
-                let start = block.start - ahead as f64 * self.step;
-                let count = block.count + ahead;
-                let drag = run.drag.signal.levels(start - shift, self.step, count);
-                let brake = run.brake.as_ref().map_or_else(
-                    || vec![0.0; count],
-                    |(_, b)| b.signal.levels(start - shift + x[3], self.step, count),
-                );
-                let (a, b) = (x[0] * self.rig.radius_m, x[1]);
-                let level: Vec<f64> = drag
-                    .iter()
-                    .zip(&brake)
-                    .map(|(f, t)| (a * (f - drag[0]) - b * (t - brake[0])) / self.rig.wheel_inertia_kg_m2)
-                    .collect();
-                let level = low_pass(&level, self.step, slower);
-                let omega = low_pass(&run.wheel.signal.means(start, self.step, count), self.step, faster);
-                (ahead..count).map(|k| omega[k] - level[k]).collect()
-            })
-            .collect()
+        let start = block.start - ahead as f64 * self.step;
+        let count = block.count + ahead;
+        let inertia = self.rig.wheel_inertia_kg_m2;
+        let brake_at = |late: f64| -> Vec<f64> {
+            let Some((_, brake)) = &run.brake else {
+                return vec![0.0; count];
+            };
+            let level = brake.signal.levels(start - shift + late, self.step, count);
+            level.iter().map(|l| (l - level[0]) / inertia).collect()
+        };
+        let brake = brake_at(x[3]);
+        let level: Vec<f64> = if let Some(base) = smoothed {
+            let wheel = run.wheel.signal.averages(start - shift + base[2], self.step, count, INSTRUMENT_S);
+            let kept = brake_at(base[3]);
+            (0..count).map(|k| x[0] * (wheel[k] + base[1] * kept[k] - x[1] * brake[k])).collect()
+        } else {
+            let drag = run.drag.signal.levels(start - shift, self.step, count);
+            let share = self.rig.radius_m / inertia;
+            (0..count).map(|k| x[0] * (share * (drag[k] - drag[0]) - x[1] * brake[k])).collect()
+        };
+        let level = low_pass(&level, self.step, slower);
+        let omega = low_pass(&run.wheel.signal.means(start, self.step, count), self.step, faster);
+        (ahead..count).map(|k| omega[k] - level[k]).collect()
+    }
+}
+
+impl Balance for Wheel<'_> {
+    fn residual(&self, x: &[f64]) -> Vec<Vec<f64>> {
+        self.each(|run, block| self.imbalance(run, block, x, None))
+    }
+
+    fn instrument(&self, base: &[f64], x: &[f64]) -> Option<Vec<Vec<f64>>> {
+        Some(self.each(|run, block| self.imbalance(run, block, x, Some(base))))
     }
 
     fn own(&self, _: &[f64]) -> Vec<Vec<Vec<f64>>> {
@@ -57,7 +76,7 @@ impl Balance for Wheel<'_> {
     }
 
     fn prior(&self) -> Vec<(f64, f64)> {
-        vec![(1.0, 0.3), (1.0, 0.3), (0.0, f64::INFINITY), (0.0, f64::INFINITY), (0.0, 1e-3)]
+        vec![(1.0, 0.05), (1.0, 0.3), (0.0, f64::INFINITY), (0.0, f64::INFINITY), (0.0, MOMENT_S2)]
     }
 }
 
@@ -115,7 +134,7 @@ pub fn wheel(rig: &Rig, runs: &[Recording]) -> Option<Estimate> {
     let mut at = refine(&balance, &start, &[0.98], 4, &[false, false, false, false, true])?;
     for _ in 0..3 {
         let colour = colour_of(&balance, &at.unknowns);
-        at = refine(&balance, &at.unknowns, &colour, 4, &[false; 5])?;
+        at = refine(&balance, &at.unknowns, &colour, 4, &[false, false, false, false, true])?;
     }
     Some(at)
 }
