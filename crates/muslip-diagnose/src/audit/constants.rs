@@ -34,9 +34,43 @@ pub const SLOWEST_SHARE: f64 = 0.15;
 pub const HELD_STEPS: usize = 8;
 /// Share of samples that repeat their predecessor in a held channel, at least.
 pub const HELD_REPEATS: f64 = 0.35;
-/// Share of renewals that come in step, at least.
-pub const HELD_REGULAR: f64 = 0.85;
 /// Standard deviation of what is expected of the second moment between two channels of a rig, s²: filters of 12 Hz.
 pub const MOMENT_S2: f64 = 1.5e-4;
 /// Width over which the vehicle's speed is averaged in the tyre's law, s: what is quicker is the drag's impulse.
 pub const SPEED_WIDTH_S: f64 = 0.25;
+/// Step at which channels are kept as integrals, s: a third of the finest grid.
+pub const KNOT_S: f64 = 0.002;
+/// Most knots of a channel; longer runs are kept more coarsely.
+pub const MOST_KNOTS: usize = 60_000;
+/// Width over which a held vehicle's speed is averaged for the instruments, s: it is only programmed to change slowly.
+pub const HELD_WIDTH_S: f64 = 0.7;
+/// Factor on the standard deviation of a delay: it is judged by half a dozen stretches (Student's quantile at two).
+pub const SPREAD_FACTOR: f64 = 1.3;
+/// What a delay may be off by because filters differ in shape from what they are taken for, s and as a share of it.
+pub const FORM_S: f64 = 3e-4;
+/// As [`FORM_S`].
+pub const FORM_SHARE: f64 = 0.04;
+/// Coherence with its period that a held channel's renewals must have, 0 to 1; chance gives less than a fifth.
+pub const HELD_COHERENCE: f64 = 0.45;
+/// Differences of a channel that its lattice is read off, at most.
+pub const LATTICE_VALUES: usize = 4000;
+/// A step is one of the channel from so many last decimals on.
+pub const LATTICE_DECIMALS: f64 = 2.5;
+/// Mean cosine of the differences over the step, at least; values on no lattice give nothing.
+pub const LATTICE_COHERENCE: f64 = 0.7;
+/// Correlation with the drag beyond which a column is the drag.
+pub const LEAK_SURE: f64 = 0.9995;
+/// The same where it copies the drag's noise as well.
+pub const LEAK_LEVEL: f64 = 0.98;
+/// Correlation of the noises from which a column copies it: two sensors' noises have none.
+pub const LEAK_COPIES: f64 = 0.25;
+/// Lowest frequency at which a line is looked for, Hz: brakes are worked at lower ones.
+pub const HUM_LOWEST_HZ: f64 = 12.0;
+/// A line's power against the median of its neighbours'.
+pub const LINE_RATIO: f64 = 15.0;
+/// An order's power against that beside it.
+pub const RIPPLE_RATIO: f64 = 8.0;
+/// Orders of the wheel's turning that are looked at.
+pub const ORDERS: [usize; 6] = [1, 2, 3, 4, 7, 11];
+/// Width of the smooth course that lines are looked for beside, s.
+pub const SMOOTH_S: f64 = 0.12;

@@ -1,11 +1,11 @@
 //! The tyre's law as a clock: the drag follows the slip, so the delay of the speeds shows wherever slip moves.
 
-use super::constants::{MOMENT_S2, SPEED_WIDTH_S, FEWEST_BLOCKS, MOST_ROWS, WHEEL_RANGE_S, WHEEL_STEP_S};
+use super::constants::{HELD_WIDTH_S, MOMENT_S2, SPEED_WIDTH_S, FEWEST_BLOCKS, MOST_ROWS, WHEEL_RANGE_S, WHEEL_STEP_S};
 use super::finding::Timing;
 use super::recording::{Block, Recording, blocks};
 use super::signal::{Signal, low_pass};
 use super::squares::{Balance, Estimate, colour_of, refine};
-use super::vehicle::{constants_of, powers};
+use super::vehicle::{constants_of, impulse_like, powers};
 use crate::campaign::Rig;
 
 /// Places of the unknowns.
@@ -30,6 +30,8 @@ struct Law<'a> {
     vehicle: Timing,
     /// Vehicle speed of each run, smoothed and, where its delay is known, in step with the drag.
     speeds: Vec<Signal>,
+    /// Whether everything is averaged over the instruments' width, drag too: coarse, but proof against noisy inputs.
+    smooth: bool,
 }
 
 /// Seconds read ahead of a block.
@@ -38,6 +40,10 @@ const RUN_UP_S: f64 = 0.15;
 const INSTRUMENT_S: f64 = 0.06;
 /// What is known of the vehicle speed's delay where no balance tells it, s.
 const VEHICLE_PRIOR_S: f64 = 0.04;
+/// Step of the grid of the coarse scan, s.
+const COARSE_S: f64 = 0.015;
+/// Farthest that the refinement may take the wheel speed's delay from the coarse scan's, s.
+const ASTRAY_S: f64 = 0.025;
 
 impl Law<'_> {
     /// Drag by the law and drag as read, on the block's grid; inputs are means over a width in s.
@@ -53,7 +59,11 @@ impl Law<'_> {
             start + x[VEHICLE] + shift - self.vehicle.value,
             self.step,
             count,
-            width,
+            if width > self.step && !self.vehicle.std.is_finite() {
+                HELD_WIDTH_S
+            } else {
+                width
+            },
         );
         let load = run.load.signal.averages(start + shift, self.step, count, width);
         let critical = x[CRITICAL].exp();
@@ -66,7 +76,8 @@ impl Law<'_> {
             })
             .collect();
         let law = low_pass(&law, self.step, faster);
-        let drag = low_pass(&run.drag.signal.means(start, self.step, count), self.step, slower);
+        let own = if self.smooth { INSTRUMENT_S } else { self.step };
+        let drag = low_pass(&run.drag.signal.averages(start, self.step, count, own), self.step, slower);
         (law[ahead..].to_vec(), drag[ahead..].to_vec())
     }
 }
@@ -76,13 +87,17 @@ impl Balance for Law<'_> {
         self.blocks
             .iter()
             .map(|block| {
-                let (law, drag) = self.series(block, x, self.step);
+                let width = if self.smooth { INSTRUMENT_S } else { self.step };
+                let (law, drag) = self.series(block, x, width);
                 drag.iter().zip(&law).map(|(d, l)| (d - l) / self.scale).collect()
             })
             .collect()
     }
 
     fn instrument(&self, _: &[f64], x: &[f64]) -> Option<Vec<Vec<f64>>> {
+        if self.smooth {
+            return None;
+        }
         Some(
             self.blocks
                 .iter()
@@ -127,7 +142,7 @@ impl Balance for Law<'_> {
 }
 
 /// The vehicle's speed smoothed. Where it coasts its quick changes are the drag's impulse: only the rest is smoothed.
-fn speed(rig: &Rig, run: &Recording, vehicle: Timing) -> Signal {
+fn speed(rig: &Rig, run: &Recording, vehicle: Timing, moment: f64) -> Signal {
     let count = run.time.len();
     let (Some(first), Some(last)) = (run.time.first(), run.time.last()) else {
         return Signal::default();
@@ -137,23 +152,24 @@ fn speed(rig: &Rig, run: &Recording, vehicle: Timing) -> Signal {
     if !vehicle.std.is_finite() {
         return Signal::new(&times, &run.speed.signal.averages(*first, step, count, SPEED_WIDTH_S));
     }
-    let speed = run.speed.signal.means(first + vehicle.value, step, count);
-    let impulse: Vec<f64> = run
-        .drag
-        .signal
-        .levels(*first, step, count)
-        .iter()
-        .map(|i| i / rig.mass_kg)
-        .collect();
-    let rest: Vec<f64> = speed.iter().zip(&impulse).map(|(v, i)| v + i).collect();
+    // In the vehicle channel's own time, the impulse as late and as slow as that channel.
+    let grid = (*first, step, count);
+    let scale = 1.0 / rig.mass_kg;
+    let impulse = |late: f64, moment: f64| -> Vec<f64> {
+        impulse_like(run, grid, late, moment).iter().map(|i| i * scale).collect()
+    };
+    let late = impulse(vehicle.value, moment);
+    let speed = run.speed.signal.means(*first, step, count);
+    let rest: Vec<f64> = speed.iter().zip(&late).map(|(v, i)| v + i).collect();
+    let impulse = impulse(0.0, 0.0);
     let rest = Signal::new(&times, &rest).averages(*first, step, count, SPEED_WIDTH_S);
     let rebuilt: Vec<f64> = rest.iter().zip(&impulse).map(|(v, i)| v - i).collect();
     Signal::new(&times, &rebuilt)
 }
 
-/// What the law says, given what is known of the vehicle speed.
+/// What the law says, given what is known of the vehicle speed: its delay, and by what second moment it is slower, s².
 #[must_use]
-pub fn law(rig: &Rig, runs: &[Recording], vehicle: Timing) -> Option<Estimate> {
+pub fn law(rig: &Rig, runs: &[Recording], vehicle: Timing, moment: f64) -> Option<Estimate> {
     if !(rig.radius_m > 0.0 && rig.peak_friction > 0.0 && rig.critical_slip > 0.0) {
         return None;
     }
@@ -171,26 +187,34 @@ pub fn law(rig: &Rig, runs: &[Recording], vehicle: Timing) -> Option<Estimate> {
             count += 1.0;
         }
     }
-    let balance = Law {
+    let even = |step: f64| blocks(&stretches, step, (0.05, 0.15), (FEWEST_BLOCKS, 12.0, 0.8));
+    let mut balance = Law {
         runs,
-        blocks: blocks(&stretches, step, (0.05, 0.15), (FEWEST_BLOCKS, 12.0, 0.8)),
+        blocks: even(step),
         rig,
         step,
         scale: sum / f64::max(count, 1.0),
         vehicle,
-        speeds: runs.iter().map(|run| speed(rig, run, vehicle)).collect(),
+        smooth: true,
+        speeds: runs.iter().map(|run| speed(rig, run, vehicle, moment)).collect(),
     };
     if balance.blocks.is_empty() || !(balance.scale > 0.0) {
         return None;
     }
+    balance.step = COARSE_S.max(step);
+    balance.blocks = even(balance.step);
     let start = coarse(&balance)?;
+    balance.smooth = false;
+    balance.step = step;
+    balance.blocks = even(step);
+    let begun = start[WHEEL];
     let known = vehicle.std.is_finite();
     let mut at = refine(&balance, &start, &[0.6], 3, &[false, false, false, false, known, true])?;
     for _ in 0..3 {
         let colour = colour_of(&balance, &at.unknowns);
         at = refine(&balance, &at.unknowns, &colour, 4, &[false, false, false, false, known, true])?;
     }
-    Some(at)
+    ((at.unknowns[WHEEL] - begun).abs() < ASTRAY_S).then_some(at)
 }
 
 /// The best of a scan over the wheel speed's delay, the law refitted at each.

@@ -3,7 +3,9 @@
 //! | question | module |
 //! | --- | --- |
 //! | when each channel tells what happened | [`timing`]: [`vehicle`], [`wheel`], [`law`], all by [`squares`] |
-//! | what is held | [`hold`] |
+//! | what is held, what moves in steps | [`hold`], [`steps`], [`simple`] |
+//! | narrow lines: hum, ripple | [`line`] |
+//! | columns made from the drag | [`leak`] |
 //! | what it says | [`finding`] |
 //! | by which figures it decides | [`constants`] |
 
@@ -11,9 +13,13 @@ pub mod constants;
 pub mod finding;
 pub mod hold;
 pub mod law;
+pub mod leak;
+pub mod line;
 pub mod recording;
 pub mod signal;
+pub mod simple;
 pub mod squares;
+pub mod steps;
 pub mod timing;
 pub mod vehicle;
 pub mod wheel;
@@ -45,7 +51,11 @@ pub fn audit(rig: &Rig, runs: &[Run]) -> Audit {
     let recordings: Vec<Recording> = runs.iter().map(|run| recording(rig, run)).collect();
     let timings = timings(rig, &recordings);
     let brake = recordings.iter().find_map(|run| run.brake.as_ref()).map_or("", |(name, _)| name);
-    let findings = timing::findings(&timings, brake);
+    let mut findings = timing::findings(&timings, brake);
+    findings.extend(simple::simple(runs, &recordings));
+    findings.extend(line::hum(&recordings));
+    findings.extend(line::ripple(&recordings));
+    findings.extend(leak::leaks(runs));
     Audit {
         wheel_late: timings.wheel,
         vehicle_late: timings.vehicle,

@@ -49,15 +49,30 @@ fn channel(time: &[f64], values: &[f64], name: &str) -> Channel {
     }
     let (clean, _) = clean("", name, time, values, &mut Vec::new());
     let hold = hold(time, values);
-    let signal = if hold.is_some() {
-        let places: Vec<usize> = renewals(&clean);
-        let times: Vec<f64> = places.iter().map(|&k| time[k]).collect();
-        let values: Vec<f64> = places.iter().map(|&k| clean[k]).collect();
-        Signal::new(&times, &values)
+    let signal = if let Some(hold) = hold {
+        renewed(time, &clean, hold.period_s)
     } else {
         Signal::new(time, &clean)
     };
     Channel { clean, signal, hold }
+}
+
+/// Renewals of a held channel joined by straight lines; where a renewal brought nothing new, it is there all the same.
+fn renewed(time: &[f64], clean: &[f64], period: f64) -> Signal {
+    let (mut times, mut values): (Vec<f64>, Vec<f64>) = (Vec::new(), Vec::new());
+    for k in renewals(clean) {
+        if let (Some(&last), Some(&value)) = (times.last(), values.last()) {
+            let (last, value): (f64, f64) = (last, value);
+            let missed = ((time[k] - last) / period).round() as usize;
+            for i in 1..missed.min(10_000) {
+                times.push(last + i as f64 * period);
+                values.push(value);
+            }
+        }
+        times.push(time[k]);
+        values.push(clean[k]);
+    }
+    Signal::new(&times, &values)
 }
 
 fn brake(rig: &Rig, run: &Run) -> Option<(&'static str, Channel)> {

@@ -1,64 +1,74 @@
 //! A recorded channel as a function of time, with its integral, so that it can be shifted and averaged exactly.
 
-/// Straight lines between readings, and their integral.
+use super::constants::{KNOT_S, MOST_KNOTS};
+
+/// A channel by its integral at even knots; between readings it is a straight line, beyond its ends constant.
 #[derive(Clone, Debug, Default)]
 pub struct Signal {
-    time: Vec<f64>,
-    value: Vec<f64>,
+    start: f64,
+    step: f64,
     integral: Vec<f64>,
+    /// First and last reading.
+    ends: (f64, f64),
 }
 
 impl Signal {
     /// Of the readings that are numbers.
     #[must_use]
     pub fn new(time: &[f64], value: &[f64]) -> Self {
-        let (mut t, mut x, mut sum) = (Vec::new(), Vec::new(), Vec::new());
-        let mut total = 0.0;
-        for (&time, &value) in time.iter().zip(value) {
-            if !(value.is_finite() && time.is_finite()) {
-                continue;
+        let mut readings: Vec<(f64, f64)> = Vec::with_capacity(time.len());
+        for (&t, &x) in time.iter().zip(value) {
+            if x.is_finite() && t.is_finite() && readings.last().is_none_or(|last| t > last.0) {
+                readings.push((t, x));
             }
-            if let (Some(&before), Some(&old)) = (t.last(), x.last()) {
-                let (before, old): (f64, f64) = (before, old);
-                if !(time > before) {
-                    continue;
-                }
-                total += 0.5 * (value + old) * (time - before);
+        }
+        let (Some(first), Some(last)) = (readings.first().copied(), readings.last().copied()) else {
+            return Self::default();
+        };
+        let span = last.0 - first.0;
+        let step = KNOT_S.max(span / MOST_KNOTS as f64);
+        let mut out = Self {
+            start: first.0,
+            step,
+            integral: vec![0.0],
+            ends: (first.1, last.1),
+        };
+        let count = (span / step).floor() as usize;
+        let (mut place, mut done) = (0, 0.0);
+        for knot in 1..=count {
+            let until = first.0 + knot as f64 * step;
+            while place + 1 < readings.len() && readings[place + 1].0 <= until {
+                let (a, b) = (readings[place], readings[place + 1]);
+                done += 0.5 * (a.1 + b.1) * (b.0 - a.0);
+                place += 1;
             }
-            t.push(time);
-            x.push(value);
-            sum.push(total);
+            let a = readings[place];
+            let slope = readings.get(place + 1).map_or(0.0, |b| (b.1 - a.1) / (b.0 - a.0));
+            let ahead = until - a.0;
+            out.integral.push(done + ahead * (a.1 + 0.5 * slope * ahead));
         }
-        Self {
-            time: t,
-            value: x,
-            integral: sum,
-        }
+        out
     }
 
     /// Whether there is nothing in it.
     #[must_use]
     pub fn is_empty(&self) -> bool {
-        self.time.is_empty()
+        self.integral.is_empty()
     }
 
-    /// Integral up to a time; beyond the ends the channel is constant. `near` is where to look first.
-    fn integral_at(&self, time: f64, near: &mut usize) -> f64 {
-        let last = self.time.len() - 1;
-        while *near > 0 && self.time[*near] > time {
-            *near -= 1;
+    /// Integral up to a time.
+    fn integral_at(&self, time: f64) -> f64 {
+        let place = (time - self.start) / self.step;
+        let last = self.integral.len() - 1;
+        if !(place > 0.0) {
+            return self.ends.0 * (time - self.start);
         }
-        while *near < last && self.time[*near + 1] <= time {
-            *near += 1;
+        if place >= last as f64 {
+            return self.integral[last] + self.ends.1 * (place - last as f64) * self.step;
         }
-        let k = *near;
-        let ahead = time - self.time[k];
-        let slope = if ahead > 0.0 && k < last {
-            (self.value[k + 1] - self.value[k]) / (self.time[k + 1] - self.time[k])
-        } else {
-            0.0
-        };
-        self.integral[k] + ahead * (self.value[k] + 0.5 * slope * ahead)
+        let k = place as usize;
+        let share = place - k as f64;
+        self.integral[k] + share * (self.integral[k + 1] - self.integral[k])
     }
 
     /// Means over `count` steps of width `step` around start, start + step, ...; zeros where there is no reading.
@@ -67,11 +77,10 @@ impl Signal {
         if self.is_empty() {
             return vec![0.0; count];
         }
-        let mut near = 0;
-        let mut before = self.integral_at(start - 0.5 * step, &mut near);
+        let mut before = self.integral_at(start - 0.5 * step);
         (0..count)
             .map(|k| {
-                let now = self.integral_at(start + (k as f64 + 0.5) * step, &mut near);
+                let now = self.integral_at(start + (k as f64 + 0.5) * step);
                 let mean = (now - before) / step;
                 before = now;
                 mean
@@ -85,12 +94,10 @@ impl Signal {
         if self.is_empty() {
             return vec![0.0; count];
         }
-        let (mut first, mut second) = (0, 0);
         (0..count)
             .map(|k| {
                 let here = start + k as f64 * step;
-                let before = self.integral_at(here - 0.5 * width, &mut first);
-                (self.integral_at(here + 0.5 * width, &mut second) - before) / width
+                (self.integral_at(here + 0.5 * width) - self.integral_at(here - 0.5 * width)) / width
             })
             .collect()
     }
@@ -101,13 +108,12 @@ impl Signal {
         if self.is_empty() {
             return vec![0.0; count];
         }
-        let mut near = 0;
-        let mut before = self.integral_at(start - 0.5 * step, &mut near);
+        let mut before = self.integral_at(start - 0.5 * step);
         (0..count)
             .map(|k| {
                 let here = start + k as f64 * step;
-                let middle = self.integral_at(here, &mut near);
-                let now = self.integral_at(here + 0.5 * step, &mut near);
+                let middle = self.integral_at(here);
+                let now = self.integral_at(here + 0.5 * step);
                 let mean = (before + 4.0 * middle + now) / 6.0;
                 before = now;
                 mean
@@ -147,12 +153,12 @@ mod tests {
         let value: Vec<f64> = time.iter().map(|t| 3.0 * t).collect();
         let signal = Signal::new(&time, &value);
         for (k, mean) in signal.means(0.2 + 0.003, 0.02, 20).iter().enumerate() {
-            assert!((mean - 3.0 * (0.203 + 0.02 * k as f64)).abs() < 1e-12);
+            assert!((mean - 3.0 * (0.203 + 0.02 * k as f64)).abs() < 1e-4);
         }
         for (k, level) in signal.levels(0.2, 0.02, 20).iter().enumerate() {
             let t = 0.2 + 0.02 * k as f64;
             // Mean of 1.5 t² over a step: 1.5 (t² + h²/12).
-            assert!((level - 1.5 * (t * t + 0.02f64.powi(2) / 12.0)).abs() < 1e-12);
+            assert!((level - 1.5 * (t * t + 0.02f64.powi(2) / 12.0)).abs() < 1e-5);
         }
     }
 

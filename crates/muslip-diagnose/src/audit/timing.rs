@@ -1,7 +1,8 @@
 //! Which speed is late, and by how much, from all balances.
 
-use super::constants::{LEAST_DELAY_S, STEP_SHARE, TOLD_SIGMAS, UNKNOWN_DELAY_S};
+use super::constants::{FORM_S, FORM_SHARE, SPREAD_FACTOR, LEAST_DELAY_S, STEP_SHARE, TOLD_SIGMAS, UNKNOWN_DELAY_S};
 use super::finding::{Finding, Timing, Word};
+use super::hold::Hold;
 use super::law;
 use super::recording::Recording;
 use super::squares::Estimate;
@@ -27,13 +28,16 @@ pub struct Timings {
     pub estimates: [Option<Estimate>; 3],
 }
 
-/// An estimate's unknown as a delay, with half a period where the channel is held and at least the sampler's doubt.
+/// An estimate's unknown as a delay, with its waiting where the channel is held and at least the sampler's doubt.
 fn delay(estimate: &Estimate, place: usize, held: f64, step: f64) -> Timing {
-    let std = estimate.std[place].hypot(STEP_SHARE * step);
+    let std = (SPREAD_FACTOR * estimate.std[place])
+        .hypot(STEP_SHARE * step)
+        .hypot(FORM_SHARE * estimate.unknowns[place])
+        .hypot(FORM_S);
     if !(std < UNKNOWN_DELAY_S) || !estimate.unknowns[place].is_finite() {
         return Timing::UNKNOWN;
     }
-    Timing { value: estimate.unknowns[place] + 0.5 * held, std }
+    Timing { value: estimate.unknowns[place] + held, std }
 }
 
 fn median_of(runs: &[Recording], pick: impl Fn(&Recording) -> f64) -> f64 {
@@ -41,32 +45,38 @@ fn median_of(runs: &[Recording], pick: impl Fn(&Recording) -> f64) -> f64 {
     if values.is_empty() { 0.0 } else { median_in_place(&mut values) }
 }
 
+/// By how much a held channel is later than its renewals as they are seen, s: half a period, less the half sampling step
+/// by which a renewal is seen too late.
+fn waiting(run: &Recording, hold: Option<Hold>) -> f64 {
+    hold.map_or(0.0, |hold| 0.5 * (hold.period_s - run.step))
+}
+
 /// All delays.
 #[must_use]
 pub fn timings(rig: &Rig, runs: &[Recording]) -> Timings {
     let mut out = Timings::default();
     let step = median_of(runs, |run| run.step);
-    let held_wheel = median_of(runs, |run| run.wheel.hold.map_or(0.0, |h| h.period_s));
-    let held_speed = median_of(runs, |run| run.speed.hold.map_or(0.0, |h| h.period_s));
+    let held_wheel = median_of(runs, |run| waiting(run, run.wheel.hold));
+    let held_speed = median_of(runs, |run| waiting(run, run.speed.hold));
     if rig.coasting && let Some(estimate) = vehicle(runs, rig.mass_kg) {
         out.vehicle = delay(&estimate, 1, held_speed, step);
         out.vehicle_moment = Some((estimate.unknowns[2], estimate.std[2]));
         out.estimates[0] = Some(estimate);
     }
-    if let Some(estimate) = wheel(rig, runs) {
-        out.wheel = delay(&estimate, 2, held_wheel, step);
-        out.brake = delay(&estimate, 3, 0.0, step);
-        out.wheel_moment = Some((estimate.unknowns[4], estimate.std[4]));
-        out.estimates[1] = Some(estimate);
-    }
-    let known = Timing { value: out.vehicle.value - 0.5 * held_speed, ..out.vehicle };
-    if let Some(estimate) = law::law(rig, runs, known) {
+    let known = Timing { value: out.vehicle.value - held_speed, ..out.vehicle };
+    if let Some(estimate) = law::law(rig, runs, known, out.vehicle_moment.map_or(0.0, |m| m.0)) {
         out.wheel = out.wheel.with(delay(&estimate, law::WHEEL, held_wheel, step));
         if !out.vehicle.std.is_finite() {
             out.vehicle = delay(&estimate, law::VEHICLE, held_speed, step);
         }
         out.wheel_moment = Some((estimate.unknowns[law::MOMENT], estimate.std[law::MOMENT]));
         out.estimates[2] = Some(estimate);
+    }
+    let known = Timing { value: out.wheel.value - held_wheel, ..out.wheel };
+    if let Some(estimate) = wheel(rig, runs, known) {
+        out.wheel = out.wheel.with(delay(&estimate, 2, held_wheel, step));
+        out.brake = delay(&estimate, 3, 0.0, step);
+        out.estimates[1] = Some(estimate);
     }
     out
 }

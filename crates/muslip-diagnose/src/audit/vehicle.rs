@@ -16,6 +16,9 @@ struct Vehicle<'a> {
 /// Seconds read ahead of a block, in which filters forget where they started.
 const RUN_UP_S: f64 = 0.4;
 
+/// Width over which the drag is averaged on either side for its slope, s.
+const CURVATURE_S: f64 = 0.03;
+
 /// Splits a signed second moment into the time constants of the first channel's and the second channel's filter.
 pub(super) fn constants_of(moment: f64) -> (f64, f64) {
     let size = moment.abs().sqrt();
@@ -28,12 +31,32 @@ impl Vehicle<'_> {
         let ahead = (RUN_UP_S / self.step) as usize;
         let start = block.start - ahead as f64 * self.step;
         let count = block.count + ahead;
-        let (slower, faster) = constants_of(moment);
-        let shift = delay - slower + faster;
-        let impulse = low_pass(&run.drag.signal.levels(start - shift, self.step, count), self.step, slower);
-        let speed = low_pass(&run.speed.signal.means(start, self.step, count), self.step, faster);
+        let impulse = impulse_like(run, (start, self.step, count), delay, moment);
+        let speed = run.speed.signal.means(start, self.step, count);
         (speed[ahead..].to_vec(), impulse[ahead..].to_vec())
     }
+}
+
+/// The drag's impulse later by a delay, and slower by a second moment: through a pole, or sharpened where that is
+/// negative. The vehicle speed is never filtered: that would only take its noise away.
+pub(super) fn impulse_like(
+    run: &Recording,
+    (start, step, count): (f64, f64, usize),
+    delay: f64,
+    moment: f64,
+) -> Vec<f64> {
+    let (slower, _) = constants_of(moment);
+    let from = start - delay + slower;
+    let mut levels = run.drag.signal.levels(from, step, count);
+    if moment >= 0.0 {
+        return low_pass(&levels, step, slower);
+    }
+    let ahead = run.drag.signal.averages(from + 0.5 * CURVATURE_S, step, count, CURVATURE_S);
+    let behind = run.drag.signal.averages(from - 0.5 * CURVATURE_S, step, count, CURVATURE_S);
+    for ((level, a), b) in levels.iter_mut().zip(ahead).zip(behind) {
+        *level += 0.5 * moment * (a - b) / CURVATURE_S;
+    }
+    levels
 }
 
 impl Balance for Vehicle<'_> {

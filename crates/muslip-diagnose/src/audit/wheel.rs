@@ -1,6 +1,7 @@
 //! The wheel's balance in level form: J ω(t) against the impulses of drag and brake.
 
 use super::constants::{MOMENT_S2, COARSE_STEP_S, FEWEST_BLOCKS, MOST_ROWS, WHEEL_RANGE_S, WHEEL_STEP_S};
+use super::finding::Timing;
 use super::recording::{Block, Recording, blocks};
 use super::signal::low_pass;
 use super::squares::{Balance, Estimate, colour_of, refine, scan_value};
@@ -16,6 +17,8 @@ struct Wheel<'a> {
     step: f64,
 }
 
+/// Delays of the brake that the refinement starts from, s.
+const BRAKES_S: [f64; 5] = [0.0, -0.02, -0.01, 0.01, 0.02];
 /// Seconds read ahead of a block.
 const RUN_UP_S: f64 = 0.15;
 /// Width over which the wheel speed is averaged for the instruments, s.
@@ -103,9 +106,9 @@ fn turning(rig: &Rig, runs: &[Recording]) -> Vec<(usize, f64, f64)> {
     out
 }
 
-/// What the balance says.
+/// What the balance says, given what the law says of the wheel speed before any hold.
 #[must_use]
-pub fn wheel(rig: &Rig, runs: &[Recording]) -> Option<Estimate> {
+pub fn wheel(rig: &Rig, runs: &[Recording], known: Timing) -> Option<Estimate> {
     if !(rig.wheel_inertia_kg_m2 > 0.0 && rig.radius_m > 0.0) {
         return None;
     }
@@ -121,16 +124,22 @@ pub fn wheel(rig: &Rig, runs: &[Recording]) -> Option<Estimate> {
     if balance.blocks.is_empty() {
         return None;
     }
-    let count = ((WHEEL_RANGE_S.1 - WHEEL_RANGE_S.0) / COARSE_STEP_S).round() as usize;
-    let best = (0..=count)
-        .filter_map(|k| {
-            let delay = WHEEL_RANGE_S.0 + k as f64 * COARSE_STEP_S;
-            let value = scan_value(&balance, &[1.0, 1.0, delay, 0.0, 0.0], &[0.98]);
-            value.is_finite().then_some((value, delay))
+    // Where the law knows the delay, from there; else from a scan. The brake's may be any of a rack's.
+    let near: Vec<f64> = if known.std.is_finite() {
+        vec![known.value]
+    } else {
+        let count = ((WHEEL_RANGE_S.1 - WHEEL_RANGE_S.0) / COARSE_STEP_S).round() as usize;
+        (0..=count).map(|k| WHEEL_RANGE_S.0 + k as f64 * COARSE_STEP_S).collect()
+    };
+    let best = near
+        .iter()
+        .flat_map(|&wheel| BRAKES_S.map(|brake| (wheel, brake)))
+        .filter_map(|(wheel, brake)| {
+            let value = scan_value(&balance, &[1.0, 1.0, wheel, brake, 0.0], &[0.98]);
+            value.is_finite().then_some((value, wheel, brake))
         })
-        .min_by(|a, b| a.0.total_cmp(&b.0))?
-        .1;
-    let start = [1.0, 1.0, best, 0.0, 0.0];
+        .min_by(|a, b| a.0.total_cmp(&b.0))?;
+    let start = [1.0, 1.0, best.1, best.2, 0.0];
     let mut at = refine(&balance, &start, &[0.98], 4, &[false, false, false, false, true])?;
     for _ in 0..3 {
         let colour = colour_of(&balance, &at.unknowns);
