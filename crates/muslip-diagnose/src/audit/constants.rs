@@ -74,3 +74,13 @@ pub const RIPPLE_RATIO: f64 = 8.0;
 pub const ORDERS: [usize; 6] = [1, 2, 3, 4, 7, 11];
 /// Width of the smooth course that lines are looked for beside, s.
 pub const SMOOTH_S: f64 = 0.12;
+/// Relative change of the wheel speed over twice [`SMOOTH_S`] up to which it is calm.
+pub const CALM: f64 = 0.015;
+/// A filter is told from so many standard deviations of its second moment.
+pub const FILTER_SIGMAS: f64 = 5.0;
+/// Shortest time constant that is told, s.
+pub const LEAST_FILTER_S: f64 = 0.008;
+/// Share of the vehicle residual's variance that lasts longer than a few samples, from which its noise is coloured.
+pub const COLOURED_SHARE: f64 = 0.75;
+/// Longest time constant of a channel's noise, s: what lasts longer is physics or drift.
+pub const LONGEST_COLOUR_S: f64 = 0.7;

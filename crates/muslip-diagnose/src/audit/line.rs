@@ -1,6 +1,6 @@
 //! Narrow lines: mains hum in the drag, and ripple of the wheel speed over the wheel's angle.
 
-use super::constants::{HUM_LOWEST_HZ, LINE_RATIO, ORDERS, RIPPLE_RATIO, SMOOTH_S};
+use super::constants::{CALM, HUM_LOWEST_HZ, LINE_RATIO, ORDERS, RIPPLE_RATIO, SMOOTH_S};
 use super::finding::{Finding, Word};
 use super::recording::Recording;
 use super::signal::Signal;
@@ -224,14 +224,32 @@ fn relative(run: &Recording) -> Vec<(Vec<f64>, Vec<f64>, f64)> {
         let rough = rough(&run.time, &run.wheel.clean, moving.start, moving.end);
         let mut angle = 0.0;
         let (mut series, mut angles) = (Vec::new(), Vec::new());
+        let course = Signal::new(&run.time[moving.clone()], wheel);
+        let hurry: Vec<f64> = moving
+            .clone()
+            .map(|k| {
+                let ends = [-SMOOTH_S, SMOOTH_S].map(|off| course.averages(run.time[k] + off, 1.0, 1, SMOOTH_S)[0]);
+                (ends[1] - ends[0]).abs() / course.averages(run.time[k], 1.0, 1, SMOOTH_S)[0].max(0.2 * middle)
+            })
+            .collect();
+        let mut sorted = hurry.clone();
+        sorted.sort_by(f64::total_cmp);
+        // Where slip changes, its course is no ripple: the calm third, and whatever else is as calm as rolling.
+        let calm = sorted[sorted.len() / 3].max(CALM);
         for (i, k) in moving.clone().enumerate() {
             if i > 0 {
                 angle += 0.5 * (wheel[i] + wheel[i - 1]) * (run.time[k] - run.time[k - 1]);
             }
-            // What changes fast is slip, not ripple.
-            let share = rough[i] / wheel[i].max(0.2 * middle);
-            series.push(share.clamp(-0.02, 0.02));
-            angles.push(angle);
+            if hurry[i] <= calm {
+                series.push(rough[i] / wheel[i].max(0.2 * middle));
+                angles.push(angle);
+            }
+        }
+        // What changes far more than usual is slip, not ripple.
+        let mut sizes: Vec<f64> = series.iter().map(|x| x.abs()).collect();
+        let most = 4.0 * median_in_place(&mut sizes);
+        for x in &mut series {
+            *x = x.clamp(-most, most);
         }
         out.push((series, angles, middle / core::f64::consts::TAU));
     }

@@ -5,11 +5,16 @@
 //! | when each channel tells what happened | [`timing`]: [`vehicle`], [`wheel`], [`law`], all by [`squares`] |
 //! | what is held, what moves in steps | [`hold`], [`steps`], [`simple`] |
 //! | narrow lines: hum, ripple | [`line`] |
+//! | what filters a channel passes | [`filter`] |
+//! | what is off at a standstill | [`still`] |
+//! | noise with a memory | [`colour`] |
 //! | columns made from the drag | [`leak`] |
 //! | what it says | [`finding`] |
 //! | by which figures it decides | [`constants`] |
 
+pub mod colour;
 pub mod constants;
+pub mod filter;
 pub mod finding;
 pub mod hold;
 pub mod law;
@@ -20,6 +25,7 @@ pub mod signal;
 pub mod simple;
 pub mod squares;
 pub mod steps;
+pub mod still;
 pub mod timing;
 pub mod vehicle;
 pub mod wheel;
@@ -27,6 +33,7 @@ pub mod wheel;
 pub use finding::{Finding, Timing, Word};
 
 use crate::campaign::{Rig, Run};
+use crate::smooth::{difference_sigma, median_in_place};
 use recording::{Recording, recording};
 use timing::{Timings, timings};
 
@@ -45,6 +52,13 @@ pub struct Audit {
     pub findings: Vec<Finding>,
 }
 
+/// Slow noise of the vehicle speed, where its balance shows it.
+fn slow_noise(timings: &Timings, recordings: &[Recording]) -> Option<Finding> {
+    let left = timings.vehicle_left.as_ref()?;
+    let mut white: Vec<f64> = recordings.iter().map(|run| difference_sigma(&run.speed.clean)).collect();
+    colour::of_vehicle(&left.residual, left.step, median_in_place(&mut white))
+}
+
 /// Audits the measuring chain of a campaign.
 #[must_use]
 pub fn audit(rig: &Rig, runs: &[Run]) -> Audit {
@@ -56,6 +70,9 @@ pub fn audit(rig: &Rig, runs: &[Run]) -> Audit {
     findings.extend(line::hum(&recordings));
     findings.extend(line::ripple(&recordings));
     findings.extend(leak::leaks(runs));
+    findings.extend(filter::filters(&timings));
+    findings.extend(still::zero(&recordings));
+    findings.extend(slow_noise(&timings, &recordings));
     Audit {
         wheel_late: timings.wheel,
         vehicle_late: timings.vehicle,

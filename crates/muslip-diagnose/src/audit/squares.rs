@@ -172,11 +172,16 @@ pub fn scan_value(balance: &impl Balance, unknowns: &[f64], coefficients: &[f64]
     sum_of(&whitener.apply(&balance.residual(unknowns)))
 }
 
+/// Residuals at the unknowns, each stretch's own columns taken out.
+#[must_use]
+pub fn rest(balance: &impl Balance, unknowns: &[f64]) -> Vec<Vec<f64>> {
+    Whitener::new(Vec::new(), &balance.own(unknowns)).apply(&balance.residual(unknowns))
+}
+
 /// Innovations' autoregression at the unknowns.
 #[must_use]
 pub fn colour_of(balance: &impl Balance, unknowns: &[f64]) -> Vec<f64> {
-    let plain = Whitener::new(Vec::new(), &balance.own(unknowns));
-    autoregression(&plain.apply(&balance.residual(unknowns)), WHITENING_ORDER)
+    autoregression(&rest(balance, unknowns), WHITENING_ORDER)
 }
 
 /// Gauss-Newton passes at a fixed whitening filter; those unknowns that are `fixed` stay.

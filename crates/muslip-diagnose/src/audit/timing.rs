@@ -6,7 +6,7 @@ use super::hold::Hold;
 use super::law;
 use super::recording::Recording;
 use super::squares::Estimate;
-use super::vehicle::vehicle;
+use super::vehicle::{Left, vehicle};
 use super::wheel::wheel;
 use crate::campaign::Rig;
 use crate::smooth::median_in_place;
@@ -24,6 +24,8 @@ pub struct Timings {
     pub vehicle_moment: Option<(f64, f64)>,
     /// Second moment by which the wheel speed is slower than the drag, s², and its standard deviation.
     pub wheel_moment: Option<(f64, f64)>,
+    /// What the vehicle's balance leaves.
+    pub vehicle_left: Option<Left>,
     /// What each balance said, for a closer look: vehicle, wheel, law.
     pub estimates: [Option<Estimate>; 3],
 }
@@ -58,7 +60,8 @@ pub fn timings(rig: &Rig, runs: &[Recording]) -> Timings {
     let step = median_of(runs, |run| run.step);
     let held_wheel = median_of(runs, |run| waiting(run, run.wheel.hold));
     let held_speed = median_of(runs, |run| waiting(run, run.speed.hold));
-    if rig.coasting && let Some(estimate) = vehicle(runs, rig.mass_kg) {
+    if rig.coasting && let Some((estimate, left)) = vehicle(runs, rig.mass_kg) {
+        out.vehicle_left = Some(left);
         out.vehicle = delay(&estimate, 1, held_speed, step);
         out.vehicle_moment = Some((estimate.unknowns[2], estimate.std[2]));
         out.estimates[0] = Some(estimate);

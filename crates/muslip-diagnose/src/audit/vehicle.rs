@@ -3,7 +3,7 @@
 use super::constants::{COARSE_STEP_S, FEWEST_BLOCKS, MOST_ROWS, SHORTEST_BLOCK_S, VEHICLE_RANGE_S, VEHICLE_STEP_S};
 use super::recording::{Block, Recording, blocks};
 use super::signal::low_pass;
-use super::squares::{Balance, Estimate, colour_of, refine, scan_value};
+use super::squares::{Balance, Estimate, colour_of, refine, rest, scan_value};
 
 /// Unknowns: scale of the drag's impulse, delay in s, and signed square of the time constant by which v is slower, s².
 struct Vehicle<'a> {
@@ -97,9 +97,18 @@ pub(super) fn powers(count: usize, how_many: i32) -> Vec<Vec<f64>> {
         .collect()
 }
 
+/// What the balance leaves, in m/s, on an even grid.
+#[derive(Clone, Debug, Default)]
+pub struct Left {
+    /// Residuals of each stretch.
+    pub residual: Vec<Vec<f64>>,
+    /// Step of the grid in s.
+    pub step: f64,
+}
+
 /// What the balance says: delay of v against the drag, and by what filter it is slower.
 #[must_use]
-pub fn vehicle(runs: &[Recording], mass: f64) -> Option<Estimate> {
+pub fn vehicle(runs: &[Recording], mass: f64) -> Option<(Estimate, Left)> {
     let stretches: Vec<(usize, f64, f64)> = runs
         .iter()
         .enumerate()
@@ -131,5 +140,6 @@ pub fn vehicle(runs: &[Recording], mass: f64) -> Option<Estimate> {
         let colour = colour_of(&balance, &at.unknowns);
         at = refine(&balance, &at.unknowns, &colour, 4, &[false; 3])?;
     }
-    Some(at)
+    let left = Left { residual: rest(&balance, &at.unknowns), step };
+    Some((at, left))
 }
