@@ -69,7 +69,7 @@ pub const HUM_LOWEST_HZ: f64 = 12.0;
 /// A line's power against the median of its neighbours'.
 pub const LINE_RATIO: f64 = 15.0;
 /// An order's power against that beside it.
-pub const RIPPLE_RATIO: f64 = 8.0;
+pub const RIPPLE_RATIO: f64 = 5.0;
 /// Orders of the wheel's turning that are looked at.
 pub const ORDERS: [usize; 6] = [1, 2, 3, 4, 7, 11];
 /// Width of the smooth course that lines are looked for beside, s.
@@ -84,3 +84,5 @@ pub const LEAST_FILTER_S: f64 = 0.008;
 pub const COLOURED_SHARE: f64 = 0.75;
 /// Longest time constant of a channel's noise, s: what lasts longer is physics or drift.
 pub const LONGEST_COLOUR_S: f64 = 0.7;
+/// Share of its free-rolling speed from which a wheel counts as rolling.
+pub const ROLLING_SHARE: f64 = 0.95;

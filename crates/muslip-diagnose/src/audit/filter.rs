@@ -2,6 +2,7 @@
 
 use super::constants::{FILTER_SIGMAS, LEAST_FILTER_S};
 use super::finding::{Finding, Timing, Word};
+use super::recording::Recording;
 use super::timing::Timings;
 
 fn passed(channel: &str, value: f64, std: f64) -> Finding {
@@ -45,8 +46,10 @@ fn of_drag(timings: &Timings) -> Option<Finding> {
 
 /// Filters of the vehicle speed and of the drag.
 #[must_use]
-pub fn filters(timings: &Timings) -> Vec<Finding> {
-    of_vehicle(timings).into_iter().chain(of_drag(timings)).collect()
+pub fn filters(timings: &Timings, runs: &[Recording]) -> Vec<Finding> {
+    // A hold is a kernel of its own.
+    let held = runs.iter().any(|run| run.speed.hold.is_some());
+    of_vehicle(timings).filter(|_| !held).into_iter().chain(of_drag(timings)).collect()
 }
 
 #[cfg(test)]
@@ -57,11 +60,11 @@ mod tests {
     fn a_filter_is_told_by_its_second_moment() {
         let late = |value: f64| Timing { value, std: 1e-3 };
         let mut timings = Timings { vehicle: late(0.05), vehicle_moment: Some((2.4e-3, 1e-4)), ..Timings::default() };
-        assert!((filters(&timings)[0].value - 0.05).abs() < 1e-9);
+        assert!((filters(&timings, &[])[0].value - 0.05).abs() < 1e-9);
         timings.vehicle_moment = Some((1e-4, 1e-4));
-        assert!(filters(&timings).is_empty());
+        assert!(filters(&timings, &[]).is_empty());
         timings = Timings { wheel: late(-0.02), brake: late(-0.0205), ..Timings::default() };
-        let found = filters(&timings);
+        let found = filters(&timings, &[]);
         assert!(found[0].channel == "drag_force_n" && (found[0].value - 0.02).abs() < 1e-3);
     }
 }

@@ -1,6 +1,6 @@
 //! Narrow lines: mains hum in the drag, and ripple of the wheel speed over the wheel's angle.
 
-use super::constants::{CALM, HUM_LOWEST_HZ, LINE_RATIO, ORDERS, RIPPLE_RATIO, SMOOTH_S};
+use super::constants::{ROLLING_SHARE, CALM, HUM_LOWEST_HZ, LINE_RATIO, ORDERS, RIPPLE_RATIO, SMOOTH_S};
 use super::finding::{Finding, Word};
 use super::recording::Recording;
 use super::signal::Signal;
@@ -236,11 +236,16 @@ fn relative(run: &Recording) -> Vec<(Vec<f64>, Vec<f64>, f64)> {
         sorted.sort_by(f64::total_cmp);
         // Where slip changes, its course is no ripple: the calm third, and whatever else is as calm as rolling.
         let calm = sorted[sorted.len() / 3].max(CALM);
+        // Turning with the vehicle, not braked: ripple is there too.
+        let ratio: Vec<f64> = moving.clone().zip(wheel).map(|(k, w)| w / run.speed.clean[k].max(1e-3)).collect();
+        let mut ratios = ratio.clone();
+        ratios.sort_by(f64::total_cmp);
+        let free = ROLLING_SHARE * ratios[ratios.len() * 9 / 10];
         for (i, k) in moving.clone().enumerate() {
             if i > 0 {
                 angle += 0.5 * (wheel[i] + wheel[i - 1]) * (run.time[k] - run.time[k - 1]);
             }
-            if hurry[i] <= calm {
+            if hurry[i] <= calm && ratio[i] > free {
                 series.push(rough[i] / wheel[i].max(0.2 * middle));
                 angles.push(angle);
             }
@@ -250,6 +255,9 @@ fn relative(run: &Recording) -> Vec<(Vec<f64>, Vec<f64>, f64)> {
         let most = 4.0 * median_in_place(&mut sizes);
         for x in &mut series {
             *x = x.clamp(-most, most);
+        }
+        if series.len() < 100 {
+            continue;
         }
         out.push((series, angles, middle / core::f64::consts::TAU));
     }

@@ -54,6 +54,9 @@ pub struct Audit {
 
 /// Slow noise of the vehicle speed, where its balance shows it.
 fn slow_noise(timings: &Timings, recordings: &[Recording]) -> Option<Finding> {
+    if recordings.iter().any(|run| run.speed.hold.is_some()) {
+        return None;
+    }
     let left = timings.vehicle_left.as_ref()?;
     let mut white: Vec<f64> = recordings.iter().map(|run| difference_sigma(&run.speed.clean)).collect();
     colour::of_vehicle(&left.residual, left.step, median_in_place(&mut white))
@@ -70,7 +73,7 @@ pub fn audit(rig: &Rig, runs: &[Run]) -> Audit {
     findings.extend(line::hum(&recordings));
     findings.extend(line::ripple(&recordings));
     findings.extend(leak::leaks(runs));
-    findings.extend(filter::filters(&timings));
+    findings.extend(filter::filters(&timings, &recordings));
     findings.extend(still::zero(&recordings));
     findings.extend(slow_noise(&timings, &recordings));
     Audit {

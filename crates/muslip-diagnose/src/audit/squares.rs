@@ -234,6 +234,10 @@ pub fn refine(
             for (place, &i) in free.iter().enumerate() {
                 unknowns[i] -= step[place] / longest;
             }
+            let moved = free.iter().enumerate().map(|(p, &i)| (step[p] / steps[i]).abs()).fold(0.0, f64::max);
+            if moved < SETTLED {
+                return last.map(|estimate| Estimate { unknowns, ..estimate });
+            }
             continue;
         }
         let before = sum / variance + penalty(&unknowns, &prior);
@@ -264,6 +268,8 @@ pub fn refine(
     last
 }
 
+/// Largest step at which an instrumental pass has settled, in the steps of the derivatives.
+const SETTLED: f64 = 0.05;
 /// Longest step of an instrumental pass, in the steps of the derivatives.
 const LONGEST_STEP: f64 = 40.0;
 
