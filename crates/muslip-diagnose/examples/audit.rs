@@ -9,8 +9,14 @@ use muslip_diagnose::campaign::{Rig, Run};
 
 /// Value of a key in a rig file; keys are unique but for the sections' noise, which the audit does not use.
 fn value(text: &str, key: &str) -> Option<f64> {
-    text.lines()
-        .find_map(|line| line.strip_prefix(key)?.trim_start().strip_prefix('=')?.trim().parse().ok())
+    text.lines().find_map(|line| {
+        line.strip_prefix(key)?
+            .trim_start()
+            .strip_prefix('=')?
+            .trim()
+            .parse()
+            .ok()
+    })
 }
 
 fn rig(path: &Path) -> Rig {
@@ -39,7 +45,9 @@ fn run(path: &Path) -> Run {
         }
     }
     let mut out = Run {
-        name: path.file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned()),
+        name: path
+            .file_name()
+            .map_or_else(String::new, |n| n.to_string_lossy().into_owned()),
         ..Run::default()
     };
     for (name, column) in header.iter().zip(columns) {
@@ -62,7 +70,10 @@ fn sorted(folder: &Path, prefix: &str) -> Vec<PathBuf> {
         .into_iter()
         .flatten()
         .filter_map(|entry| Some(entry.ok()?.path()))
-        .filter(|path| path.file_name().is_some_and(|n| n.to_string_lossy().starts_with(prefix)))
+        .filter(|path| {
+            path.file_name()
+                .is_some_and(|n| n.to_string_lossy().starts_with(prefix))
+        })
         .collect();
     paths.sort();
     paths
@@ -72,25 +83,52 @@ fn main() {
     let folder = std::env::args().nth(1).unwrap_or_default();
     for campaign in sorted(Path::new(&folder), "campaign-") {
         let rig = rig(&campaign.join("rig.toml"));
-        let runs: Vec<Run> = sorted(&campaign, "run").iter().map(|path| run(path)).collect();
+        let runs: Vec<Run> = sorted(&campaign, "run")
+            .iter()
+            .map(|path| run(path))
+            .collect();
         let samples: usize = runs.iter().map(Run::len).sum();
-        let name = campaign.file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned());
+        let name = campaign
+            .file_name()
+            .map_or_else(String::new, |n| n.to_string_lossy().into_owned());
         let clock = Instant::now();
         let found = audit(&rig, &runs);
-        println!("{name}\ttook\t{}\t{:.4}\t{samples}", runs.len(), clock.elapsed().as_secs_f64());
-        for (what, late) in [("wheel", found.wheel_late), ("vehicle", found.vehicle_late), ("brake", found.brake_late)] {
+        println!(
+            "{name}\ttook\t{}\t{:.4}\t{samples}",
+            runs.len(),
+            clock.elapsed().as_secs_f64()
+        );
+        for (what, late) in [
+            ("wheel", found.wheel_late),
+            ("vehicle", found.vehicle_late),
+            ("brake", found.brake_late),
+        ] {
             println!("{name}\ttiming\t{what}\t{}\t{}", late.value, late.std);
         }
-        for (balance, estimate) in ["vehicle", "wheel", "law"].iter().zip(&found.timings.estimates) {
+        for (balance, estimate) in ["vehicle", "wheel", "law"]
+            .iter()
+            .zip(&found.timings.estimates)
+        {
             if let Some(e) = estimate {
-                let figures: Vec<String> =
-                    e.unknowns.iter().zip(&e.std).map(|(x, s)| format!("{x:.5}+-{s:.5}")).collect();
-                println!("{name}\tbalance\t{balance}\t{}\t{}", figures.join(" "), e.rows);
+                let figures: Vec<String> = e
+                    .unknowns
+                    .iter()
+                    .zip(&e.std)
+                    .map(|(x, s)| format!("{x:.5}+-{s:.5}"))
+                    .collect();
+                println!(
+                    "{name}\tbalance\t{balance}\t{}\t{}",
+                    figures.join(" "),
+                    e.rows
+                );
             }
         }
         for f in &found.findings {
             let word = format!("{:?}", f.finding);
-            println!("{name}\tfinding\t{}:{word}\t{}\t{}", f.channel, f.value, f.std);
+            println!(
+                "{name}\tfinding\t{}:{word}\t{}\t{}",
+                f.channel, f.value, f.std
+            );
         }
     }
 }

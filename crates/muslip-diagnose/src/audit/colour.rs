@@ -10,7 +10,11 @@ pub fn coloured(residual: &[Vec<f64>], step: f64) -> Option<(f64, f64)> {
     let covariance = |lag: usize| -> f64 {
         let (mut sum, mut count) = (0.0, 0.0);
         for block in residual.iter().filter(|b| b.len() > 2 * most) {
-            sum += block.iter().zip(&block[lag..]).map(|(a, b)| a * b).sum::<f64>();
+            sum += block
+                .iter()
+                .zip(&block[lag..])
+                .map(|(a, b)| a * b)
+                .sum::<f64>();
             count += (block.len() - lag) as f64;
         }
         sum / f64::max(count, 1.0)
@@ -47,7 +51,9 @@ mod tests {
         let (mut state, mut x) = (7u64, 0.0);
         (0..20_000)
             .map(|_| {
-                state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+                state = state
+                    .wrapping_mul(6_364_136_223_846_793_005)
+                    .wrapping_add(1_442_695_040_888_963_407);
                 x = keep * x + ((state >> 11) as f64 / (1u64 << 53) as f64 - 0.5);
                 x
             })
@@ -60,7 +66,10 @@ mod tests {
         let keep = (-0.1f64).exp();
         let (std, time) = coloured(&[noise(keep)], 0.01).unwrap();
         let expected = (1.0 / 12.0 / (1.0 - keep * keep)).sqrt();
-        assert!((std / expected - 1.0).abs() < 0.1 && (time - 0.1).abs() < 0.02, "{std} {time}");
+        assert!(
+            (std / expected - 1.0).abs() < 0.1 && (time - 0.1).abs() < 0.02,
+            "{std} {time}"
+        );
         assert!(coloured(&[], 0.01).is_none());
     }
 }

@@ -24,7 +24,11 @@ fn of_vehicle(timings: &Timings) -> Option<Finding> {
     if late.std.is_finite() && (late.value - time).abs() < 0.2 * time + 2.0 * late.std {
         return Some(passed("vehicle_speed_m_s", late.value, late.std));
     }
-    Some(passed("vehicle_speed_m_s", time, (0.5 * std / time).max(0.1 * time)))
+    Some(passed(
+        "vehicle_speed_m_s",
+        time,
+        (0.5 * std / time).max(0.1 * time),
+    ))
 }
 
 /// A filter of the drag: everything else is early by the same, and the vehicle speed, where it shows, the quicker by
@@ -39,9 +43,19 @@ fn of_drag(timings: &Timings) -> Option<Finding> {
         return None;
     }
     let all = early.iter().copied().fold(Timing::UNKNOWN, Timing::with);
-    let apart = early.iter().any(|t| (t.value - all.value).abs() > 2.0 * t.std + 0.1 * all.value.abs());
-    let quicker = timings.vehicle_moment.is_none_or(|(moment, std)| moment < -FILTER_SIGMAS * std);
-    (!apart && quicker).then(|| passed("drag_force_n", -all.value, all.std.max(0.05 * all.value.abs())))
+    let apart = early
+        .iter()
+        .any(|t| (t.value - all.value).abs() > 2.0 * t.std + 0.1 * all.value.abs());
+    let quicker = timings
+        .vehicle_moment
+        .is_none_or(|(moment, std)| moment < -FILTER_SIGMAS * std);
+    (!apart && quicker).then(|| {
+        passed(
+            "drag_force_n",
+            -all.value,
+            all.std.max(0.05 * all.value.abs()),
+        )
+    })
 }
 
 /// Filters of the vehicle speed and of the drag.
@@ -49,7 +63,11 @@ fn of_drag(timings: &Timings) -> Option<Finding> {
 pub fn filters(timings: &Timings, runs: &[Recording]) -> Vec<Finding> {
     // A hold is a kernel of its own.
     let held = runs.iter().any(|run| run.speed.hold.is_some());
-    of_vehicle(timings).filter(|_| !held).into_iter().chain(of_drag(timings)).collect()
+    of_vehicle(timings)
+        .filter(|_| !held)
+        .into_iter()
+        .chain(of_drag(timings))
+        .collect()
 }
 
 #[cfg(test)]
@@ -59,11 +77,19 @@ mod tests {
     #[test]
     fn a_filter_is_told_by_its_second_moment() {
         let late = |value: f64| Timing { value, std: 1e-3 };
-        let mut timings = Timings { vehicle: late(0.05), vehicle_moment: Some((2.4e-3, 1e-4)), ..Timings::default() };
+        let mut timings = Timings {
+            vehicle: late(0.05),
+            vehicle_moment: Some((2.4e-3, 1e-4)),
+            ..Timings::default()
+        };
         assert!((filters(&timings, &[])[0].value - 0.05).abs() < 1e-9);
         timings.vehicle_moment = Some((1e-4, 1e-4));
         assert!(filters(&timings, &[]).is_empty());
-        timings = Timings { wheel: late(-0.02), brake: late(-0.0205), ..Timings::default() };
+        timings = Timings {
+            wheel: late(-0.02),
+            brake: late(-0.0205),
+            ..Timings::default()
+        };
         let found = filters(&timings, &[]);
         assert!(found[0].channel == "drag_force_n" && (found[0].value - 0.02).abs() < 1e-3);
     }

@@ -44,7 +44,11 @@ pub fn hold(time: &[f64], value: &[f64]) -> Option<Hold> {
     gaps.sort_by(f64::total_cmp);
     // Single periods: from the shortest usual gap on, one step of the sampler wide.
     let shortest = gaps[gaps.len() / 10];
-    let single: Vec<f64> = gaps.iter().copied().filter(|g| *g > 0.5 * shortest && *g <= shortest + 1.2 * step).collect();
+    let single: Vec<f64> = gaps
+        .iter()
+        .copied()
+        .filter(|g| *g > 0.5 * shortest && *g <= shortest + 1.2 * step)
+        .collect();
     let first = single.iter().sum::<f64>() / single.len() as f64;
     let mut period = first;
     let mut coherent = 0.0;
@@ -62,7 +66,11 @@ pub fn hold(time: &[f64], value: &[f64]) -> Option<Hold> {
 
 fn sinc(x: f64) -> f64 {
     let angle = core::f64::consts::PI * x;
-    if angle.abs() < 1e-9 { 1.0 } else { (angle.sin() / angle).abs() }
+    if angle.abs() < 1e-9 {
+        1.0
+    } else {
+        (angle.sin() / angle).abs()
+    }
 }
 
 /// The period near a given one with which the moments are most coherent, and how coherent.
@@ -83,7 +91,10 @@ fn sharpest(moments: &[f64], near: f64, reach: f64) -> (f64, f64) {
             }
             (period, f64::hypot(cos, sin) / count)
         })
-        .fold((near, 0.0), |best, trial| if trial.1 > best.1 { trial } else { best })
+        .fold(
+            (near, 0.0),
+            |best, trial| if trial.1 > best.1 { trial } else { best },
+        )
 }
 
 #[cfg(test)]
@@ -93,7 +104,10 @@ mod tests {
     #[test]
     fn a_held_ramp_shows_its_period_and_a_smooth_one_none() {
         let time: Vec<f64> = (0..2000).map(|k| f64::from(k) * 0.004).collect();
-        let held: Vec<f64> = time.iter().map(|t| 30.0 - 2.0 * (t / 0.05).floor() * 0.05).collect();
+        let held: Vec<f64> = time
+            .iter()
+            .map(|t| 30.0 - 2.0 * (t / 0.05).floor() * 0.05)
+            .collect();
         let found = hold(&time, &held).unwrap();
         assert!((found.period_s - 0.05).abs() < 1e-3, "{found:?}");
         let plain: Vec<f64> = time.iter().map(|t| 30.0 - 2.0 * t).collect();

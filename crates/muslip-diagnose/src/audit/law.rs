@@ -1,6 +1,8 @@
 //! The tyre's law as a clock: the drag follows the slip, so the delay of the speeds shows wherever slip moves.
 
-use super::constants::{HELD_WIDTH_S, MOMENT_S2, SPEED_WIDTH_S, FEWEST_BLOCKS, MOST_ROWS, WHEEL_RANGE_S, WHEEL_STEP_S};
+use super::constants::{
+    FEWEST_BLOCKS, HELD_WIDTH_S, MOMENT_S2, MOST_ROWS, SPEED_WIDTH_S, WHEEL_RANGE_S, WHEEL_STEP_S,
+};
 use super::finding::Timing;
 use super::recording::{Block, Recording, blocks};
 use super::signal::{Signal, low_pass};
@@ -54,7 +56,10 @@ impl Law<'_> {
         let ahead = (RUN_UP_S / self.step) as usize;
         let start = block.start - ahead as f64 * self.step;
         let count = block.count + ahead;
-        let omega = run.wheel.signal.averages(start + x[WHEEL] + shift, self.step, count, width);
+        let omega = run
+            .wheel
+            .signal
+            .averages(start + x[WHEEL] + shift, self.step, count, width);
         let speed = self.speeds[block.run].averages(
             start + x[VEHICLE] + shift - self.vehicle.value,
             self.step,
@@ -65,7 +70,10 @@ impl Law<'_> {
                 width
             },
         );
-        let load = run.load.signal.averages(start + shift, self.step, count, width);
+        let load = run
+            .load
+            .signal
+            .averages(start + shift, self.step, count, width);
         let critical = x[CRITICAL].exp();
         let law: Vec<f64> = (0..count)
             .map(|k| {
@@ -77,7 +85,11 @@ impl Law<'_> {
             .collect();
         let law = low_pass(&law, self.step, faster);
         let own = if self.smooth { INSTRUMENT_S } else { self.step };
-        let drag = low_pass(&run.drag.signal.averages(start, self.step, count, own), self.step, slower);
+        let drag = low_pass(
+            &run.drag.signal.averages(start, self.step, count, own),
+            self.step,
+            slower,
+        );
         (law[ahead..].to_vec(), drag[ahead..].to_vec())
     }
 }
@@ -89,7 +101,10 @@ impl Balance for Law<'_> {
             .map(|block| {
                 let width = if self.smooth { INSTRUMENT_S } else { self.step };
                 let (law, drag) = self.series(block, x, width);
-                drag.iter().zip(&law).map(|(d, l)| (d - l) / self.scale).collect()
+                drag.iter()
+                    .zip(&law)
+                    .map(|(d, l)| (d - l) / self.scale)
+                    .collect()
             })
             .collect()
     }
@@ -150,13 +165,21 @@ fn speed(rig: &Rig, run: &Recording, vehicle: Timing, moment: f64) -> Signal {
     let step = ((last - first) / count.max(2) as f64).max(1e-4);
     let times: Vec<f64> = (0..count).map(|k| first + k as f64 * step).collect();
     if !vehicle.std.is_finite() {
-        return Signal::new(&times, &run.speed.signal.averages(*first, step, count, SPEED_WIDTH_S));
+        return Signal::new(
+            &times,
+            &run.speed
+                .signal
+                .averages(*first, step, count, SPEED_WIDTH_S),
+        );
     }
     // In the vehicle channel's own time, the impulse as late and as slow as that channel.
     let grid = (*first, step, count);
     let scale = 1.0 / rig.mass_kg;
     let impulse = |late: f64, moment: f64| -> Vec<f64> {
-        impulse_like(run, grid, late, moment).iter().map(|i| i * scale).collect()
+        impulse_like(run, grid, late, moment)
+            .iter()
+            .map(|i| i * scale)
+            .collect()
     };
     let late = impulse(vehicle.value, moment);
     let speed = run.speed.signal.means(*first, step, count);
@@ -176,7 +199,11 @@ pub fn law(rig: &Rig, runs: &[Recording], vehicle: Timing, moment: f64) -> Optio
     let stretches: Vec<(usize, f64, f64)> = runs
         .iter()
         .enumerate()
-        .flat_map(|(r, run)| run.moving.iter().map(move |m| (r, run.time[m.start], run.time[m.end - 1])))
+        .flat_map(|(r, run)| {
+            run.moving
+                .iter()
+                .map(move |m| (r, run.time[m.start], run.time[m.end - 1]))
+        })
         .collect();
     let whole: f64 = stretches.iter().map(|(_, a, b)| b - a).sum();
     let step = WHEEL_STEP_S.max(whole / MOST_ROWS as f64);
@@ -196,7 +223,10 @@ pub fn law(rig: &Rig, runs: &[Recording], vehicle: Timing, moment: f64) -> Optio
         scale: sum / f64::max(count, 1.0),
         vehicle,
         smooth: true,
-        speeds: runs.iter().map(|run| speed(rig, run, vehicle, moment)).collect(),
+        speeds: runs
+            .iter()
+            .map(|run| speed(rig, run, vehicle, moment))
+            .collect(),
     };
     if balance.blocks.is_empty() || !(balance.scale > 0.0) {
         return None;
@@ -209,10 +239,22 @@ pub fn law(rig: &Rig, runs: &[Recording], vehicle: Timing, moment: f64) -> Optio
     balance.blocks = even(step);
     let begun = start[WHEEL];
     let known = vehicle.std.is_finite();
-    let mut at = refine(&balance, &start, &[0.6], 3, &[false, false, false, false, known, true])?;
+    let mut at = refine(
+        &balance,
+        &start,
+        &[0.6],
+        3,
+        &[false, false, false, false, known, true],
+    )?;
     for _ in 0..3 {
         let colour = colour_of(&balance, &at.unknowns);
-        at = refine(&balance, &at.unknowns, &colour, 4, &[false, false, false, false, known, true])?;
+        at = refine(
+            &balance,
+            &at.unknowns,
+            &colour,
+            4,
+            &[false, false, false, false, known, true],
+        )?;
     }
     ((at.unknowns[WHEEL] - begun).abs() < ASTRAY_S).then_some(at)
 }

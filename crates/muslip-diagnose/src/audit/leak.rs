@@ -5,13 +5,25 @@ use super::finding::{Finding, Word};
 use crate::campaign::Run;
 
 fn correlation(pairs: impl Iterator<Item = (f64, f64)> + Clone) -> (f64, f64) {
-    let finite = || pairs.clone().filter(|(a, b)| a.is_finite() && b.is_finite() && a.abs() < 1e15 && b.abs() < 1e15);
+    let finite = || {
+        pairs
+            .clone()
+            .filter(|(a, b)| a.is_finite() && b.is_finite() && a.abs() < 1e15 && b.abs() < 1e15)
+    };
     let count = finite().count().max(1) as f64;
     let (a, b) = finite().fold((0.0, 0.0), |s, p| (s.0 + p.0 / count, s.1 + p.1 / count));
     let (aa, bb, ab) = finite().fold((0.0, 0.0, 0.0), |s, p| {
-        (s.0 + (p.0 - a).powi(2), s.1 + (p.1 - b).powi(2), s.2 + (p.0 - a) * (p.1 - b))
+        (
+            s.0 + (p.0 - a).powi(2),
+            s.1 + (p.1 - b).powi(2),
+            s.2 + (p.0 - a) * (p.1 - b),
+        )
     });
-    let value = if aa > 0.0 && bb > 0.0 { ab / (aa * bb).sqrt() } else { 0.0 };
+    let value = if aa > 0.0 && bb > 0.0 {
+        ab / (aa * bb).sqrt()
+    } else {
+        0.0
+    };
     (value, count)
 }
 
@@ -23,7 +35,10 @@ fn rough(x: &[f64]) -> impl Iterator<Item = f64> + Clone + '_ {
 /// Columns that follow the drag to within a thousandth, or nearly so and copy its noise.
 #[must_use]
 pub fn leaks(runs: &[Run]) -> Vec<Finding> {
-    let mut names: Vec<&str> = runs.iter().flat_map(|run| run.extra.iter().map(|(name, _)| name.as_str())).collect();
+    let mut names: Vec<&str> = runs
+        .iter()
+        .flat_map(|run| run.extra.iter().map(|(name, _)| name.as_str()))
+        .collect();
     names.sort_unstable();
     names.dedup();
     names
@@ -60,7 +75,9 @@ mod tests {
 
     #[test]
     fn a_copy_of_the_drag_leaks_and_a_mere_likeness_does_not() {
-        let drag: Vec<f64> = (0..500).map(|k| 1000.0 * (f64::from(k) * 0.02).sin() + f64::from((k * 7919) % 101)).collect();
+        let drag: Vec<f64> = (0..500)
+            .map(|k| 1000.0 * (f64::from(k) * 0.02).sin() + f64::from((k * 7919) % 101))
+            .collect();
         let copy: Vec<f64> = drag.iter().map(|d| 0.001 * d + 2.0).collect();
         let like: Vec<f64> = (0..500).map(|k| (f64::from(k) * 0.021).sin()).collect();
         let run = |extra: Vec<f64>| Run {

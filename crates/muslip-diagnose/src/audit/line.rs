@@ -1,6 +1,8 @@
 //! Narrow lines: mains hum in the drag, and ripple of the wheel speed over the wheel's angle.
 
-use super::constants::{ROLLING_SHARE, CALM, HUM_LOWEST_HZ, LINE_RATIO, ORDERS, RIPPLE_RATIO, SMOOTH_S};
+use super::constants::{
+    CALM, HUM_LOWEST_HZ, LINE_RATIO, ORDERS, RIPPLE_RATIO, ROLLING_SHARE, SMOOTH_S,
+};
 use super::finding::{Finding, Word};
 use super::recording::Recording;
 use super::signal::Signal;
@@ -21,13 +23,19 @@ fn pointer(series: &[f64], phase: impl Fn(usize) -> f64) -> (f64, f64) {
 /// Readings less their own smooth course, and how much of a line of a frequency that leaves.
 fn rough(time: &[f64], clean: &[f64], from: usize, to: usize) -> Vec<f64> {
     let signal = Signal::new(&time[from..to], &clean[from..to]);
-    (from..to).map(|k| clean[k] - signal.averages(time[k], 1.0, 1, SMOOTH_S)[0]).collect()
+    (from..to)
+        .map(|k| clean[k] - signal.averages(time[k], 1.0, 1, SMOOTH_S)[0])
+        .collect()
 }
 
 /// Share of a sine of a frequency that the smooth course takes away.
 fn taken(hz: f64) -> f64 {
     let angle = core::f64::consts::PI * hz * SMOOTH_S;
-    if angle < 1e-6 { 1.0 } else { angle.sin() / angle }
+    if angle < 1e-6 {
+        1.0
+    } else {
+        angle.sin() / angle
+    }
 }
 
 struct Piece {
@@ -49,7 +57,10 @@ fn pieces(runs: &[Recording], spacing: f64, count: usize) -> Vec<Piece> {
             }
             let rough = rough(&run.time, clean, 0, n);
             let rate = 1.0 / run.step;
-            let length = ((rate / spacing).round() as usize).max(n).next_power_of_two().min(1 << 17);
+            let length = ((rate / spacing).round() as usize)
+                .max(n)
+                .next_power_of_two()
+                .min(1 << 17);
             let span = run.time[n - 1] - run.time[0];
             let even = ((span * rate) as usize).min(length);
             let signal = Signal::new(&run.time, &rough);
@@ -77,7 +88,11 @@ fn pieces(runs: &[Recording], spacing: f64, count: usize) -> Vec<Piece> {
                         / whole
                 })
                 .collect();
-            Some(Piece { time: run.time.clone(), rough, spectrum })
+            Some(Piece {
+                time: run.time.clone(),
+                rough,
+                spectrum,
+            })
         })
         .collect()
 }
@@ -86,7 +101,10 @@ fn pieces(runs: &[Recording], spacing: f64, count: usize) -> Vec<Piece> {
 #[must_use]
 pub fn hum(runs: &[Recording]) -> Option<Finding> {
     let mut rates: Vec<f64> = runs.iter().map(|run| 1.0 / run.step).collect();
-    let mut spans: Vec<f64> = runs.iter().filter_map(|run| Some(run.time.last()? - run.time.first()?)).collect();
+    let mut spans: Vec<f64> = runs
+        .iter()
+        .filter_map(|run| Some(run.time.last()? - run.time.first()?))
+        .collect();
     if spans.is_empty() {
         return None;
     }
@@ -108,16 +126,24 @@ pub fn hum(runs: &[Recording]) -> Option<Finding> {
         .map(|i| mean[i])
         .collect();
     let floor = median_in_place(&mut around);
-    let flank = [best.saturating_sub(3), (best + 3).min(count - 1)].map(|i| mean[i]).into_iter().fold(0.0, f64::max);
+    let flank = [best.saturating_sub(3), (best + 3).min(count - 1)]
+        .map(|i| mean[i])
+        .into_iter()
+        .fold(0.0, f64::max);
     // In most runs, and narrow: a resonance is as high three lines away.
     let everywhere = pieces
         .iter()
         .filter(|p| {
-            let mut own: Vec<f64> = (best.saturating_sub(reach)..(best + reach).min(count)).map(|i| p.spectrum[i]).collect();
+            let mut own: Vec<f64> = (best.saturating_sub(reach)..(best + reach).min(count))
+                .map(|i| p.spectrum[i])
+                .collect();
             p.spectrum[best] > 4.0 * median_in_place(&mut own)
         })
         .count();
-    if !(mean[best] > LINE_RATIO * floor && mean[best] > 6.0 * flank && 4 * everywhere >= 3 * pieces.len()) {
+    if !(mean[best] > LINE_RATIO * floor
+        && mean[best] > 6.0 * flank
+        && 4 * everywhere >= 3 * pieces.len())
+    {
         return None;
     }
     let (hz, amplitudes) = sharpen(&pieces, best as f64 * spacing, spacing);
@@ -129,8 +155,15 @@ pub fn hum(runs: &[Recording]) -> Option<Finding> {
     let value = (amplitudes.iter().map(|a| a * a).sum::<f64>() / count).sqrt();
     let spread = amplitudes.iter().map(|a| (a - value).powi(2)).sum::<f64>() / count;
     Some(
-        Finding::of("drag_force_n", Word::Hum, (value, (spread / count).sqrt().max(0.02 * value)), "N")
-            .saying(format!("The drag channel hums at {hz:.2} Hz with an amplitude of {value:.3} N.")),
+        Finding::of(
+            "drag_force_n",
+            Word::Hum,
+            (value, (spread / count).sqrt().max(0.02 * value)),
+            "N",
+        )
+        .saying(format!(
+            "The drag channel hums at {hz:.2} Hz with an amplitude of {value:.3} N."
+        )),
     )
 }
 
@@ -158,7 +191,11 @@ fn turns(runs: &[Recording], hz: f64, spacing: f64) -> bool {
     let hits = runs
         .iter()
         .filter(|run| {
-            let mut speeds: Vec<f64> = run.moving.iter().flat_map(|m| run.wheel.clean[m.clone()].iter().copied()).collect();
+            let mut speeds: Vec<f64> = run
+                .moving
+                .iter()
+                .flat_map(|m| run.wheel.clean[m.clone()].iter().copied())
+                .collect();
             if speeds.is_empty() {
                 return false;
             }
@@ -187,10 +224,14 @@ pub fn ripple(runs: &[Recording]) -> Option<Finding> {
                 })
                 .collect()
         };
-        let power = |amplitudes: &[f64]| amplitudes.iter().map(|a| a * a).sum::<f64>() / amplitudes.len() as f64;
+        let power = |amplitudes: &[f64]| {
+            amplitudes.iter().map(|a| a * a).sum::<f64>() / amplitudes.len() as f64
+        };
         let own = at(order as f64);
-        let mut beside: Vec<f64> =
-            [-0.45, -0.3, 0.3, 0.45].iter().map(|off| power(&at(order as f64 + off))).collect();
+        let mut beside: Vec<f64> = [-0.45, -0.3, 0.3, 0.45]
+            .iter()
+            .map(|off| power(&at(order as f64 + off)))
+            .collect();
         let floor = median_in_place(&mut beside);
         if power(&own) > RIPPLE_RATIO * floor {
             found.push((order, own, floor));
@@ -203,11 +244,24 @@ pub fn ripple(runs: &[Recording]) -> Option<Finding> {
     let mut sorted = amplitudes.clone();
     let middle = median_in_place(&mut sorted);
     let value = (middle * middle - floor).max(0.25 * middle * middle).sqrt();
-    let spread = (amplitudes.iter().map(|a| (a - middle).powi(2)).sum::<f64>() / count / count).sqrt();
-    let times = if order == 1 { "once".to_owned() } else { format!("{order} times") };
+    let spread =
+        (amplitudes.iter().map(|a| (a - middle).powi(2)).sum::<f64>() / count / count).sqrt();
+    let times = if order == 1 {
+        "once".to_owned()
+    } else {
+        format!("{order} times")
+    };
     (value > 3.0 * spread).then(|| {
-        Finding::of("wheel_speed_rad_s", Word::Ripple, (value, spread.max(0.03 * value)), "1")
-            .saying(format!("The wheel speed varies by {:.2} % {times} a revolution.", 100.0 * value))
+        Finding::of(
+            "wheel_speed_rad_s",
+            Word::Ripple,
+            (value, spread.max(0.03 * value)),
+            "1",
+        )
+        .saying(format!(
+            "The wheel speed varies by {:.2} % {times} a revolution.",
+            100.0 * value
+        ))
     })
 }
 
@@ -228,8 +282,10 @@ fn relative(run: &Recording) -> Vec<(Vec<f64>, Vec<f64>, f64)> {
         let hurry: Vec<f64> = moving
             .clone()
             .map(|k| {
-                let ends = [-SMOOTH_S, SMOOTH_S].map(|off| course.averages(run.time[k] + off, 1.0, 1, SMOOTH_S)[0]);
-                (ends[1] - ends[0]).abs() / course.averages(run.time[k], 1.0, 1, SMOOTH_S)[0].max(0.2 * middle)
+                let ends = [-SMOOTH_S, SMOOTH_S]
+                    .map(|off| course.averages(run.time[k] + off, 1.0, 1, SMOOTH_S)[0]);
+                (ends[1] - ends[0]).abs()
+                    / course.averages(run.time[k], 1.0, 1, SMOOTH_S)[0].max(0.2 * middle)
             })
             .collect();
         let mut sorted = hurry.clone();
@@ -237,7 +293,11 @@ fn relative(run: &Recording) -> Vec<(Vec<f64>, Vec<f64>, f64)> {
         // Where slip changes, its course is no ripple: the calm third, and whatever else is as calm as rolling.
         let calm = sorted[sorted.len() / 3].max(CALM);
         // Turning with the vehicle, not braked: ripple is there too.
-        let ratio: Vec<f64> = moving.clone().zip(wheel).map(|(k, w)| w / run.speed.clean[k].max(1e-3)).collect();
+        let ratio: Vec<f64> = moving
+            .clone()
+            .zip(wheel)
+            .map(|(k, w)| w / run.speed.clean[k].max(1e-3))
+            .collect();
         let mut ratios = ratio.clone();
         ratios.sort_by(f64::total_cmp);
         let free = ROLLING_SHARE * ratios[ratios.len() * 9 / 10];

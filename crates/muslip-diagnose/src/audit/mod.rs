@@ -58,7 +58,10 @@ fn slow_noise(timings: &Timings, recordings: &[Recording]) -> Option<Finding> {
         return None;
     }
     let left = timings.vehicle_left.as_ref()?;
-    let mut white: Vec<f64> = recordings.iter().map(|run| difference_sigma(&run.speed.clean)).collect();
+    let mut white: Vec<f64> = recordings
+        .iter()
+        .map(|run| difference_sigma(&run.speed.clean))
+        .collect();
     colour::of_vehicle(&left.residual, left.step, median_in_place(&mut white))
 }
 
@@ -67,7 +70,10 @@ fn slow_noise(timings: &Timings, recordings: &[Recording]) -> Option<Finding> {
 pub fn audit(rig: &Rig, runs: &[Run]) -> Audit {
     let recordings: Vec<Recording> = runs.iter().map(|run| recording(rig, run)).collect();
     let timings = timings(rig, &recordings);
-    let brake = recordings.iter().find_map(|run| run.brake.as_ref()).map_or("", |(name, _)| name);
+    let brake = recordings
+        .iter()
+        .find_map(|run| run.brake.as_ref())
+        .map_or("", |(name, _)| name);
     let mut findings = timing::findings(&timings, brake);
     findings.extend(simple::simple(runs, &recordings));
     findings.extend(line::hum(&recordings));

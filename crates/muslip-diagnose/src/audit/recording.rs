@@ -54,7 +54,11 @@ fn channel(time: &[f64], values: &[f64], name: &str) -> Channel {
     } else {
         Signal::new(time, &clean)
     };
-    Channel { clean, signal, hold }
+    Channel {
+        clean,
+        signal,
+        hold,
+    }
 }
 
 /// Renewals of a held channel joined by straight lines; where a renewal brought nothing new, it is there all the same.
@@ -80,21 +84,34 @@ fn brake(rig: &Rig, run: &Run) -> Option<(&'static str, Channel)> {
         && pressure.iter().any(|x| x.is_finite())
     {
         let torque: Vec<f64> = pressure.iter().map(|p| p * gain).collect();
-        return Some(("brake_pressure_pa", channel(&run.time_s, &torque, "brake_pressure_pa")));
+        return Some((
+            "brake_pressure_pa",
+            channel(&run.time_s, &torque, "brake_pressure_pa"),
+        ));
     }
     let torque = run.brake_torque_nm.as_ref()?;
-    torque
-        .iter()
-        .any(|x| x.is_finite())
-        .then(|| ("brake_torque_nm", channel(&run.time_s, torque, "brake_torque_nm")))
+    torque.iter().any(|x| x.is_finite()).then(|| {
+        (
+            "brake_torque_nm",
+            channel(&run.time_s, torque, "brake_torque_nm"),
+        )
+    })
 }
 
 /// Makes a run ready.
 #[must_use]
 pub fn recording(rig: &Rig, run: &Run) -> Recording {
     let time = &run.time_s;
-    let mut steps: Vec<f64> = time.windows(2).map(|w| w[1] - w[0]).filter(|d| *d > 0.0).collect();
-    let step = if steps.is_empty() { 1.0 } else { median_in_place(&mut steps) };
+    let mut steps: Vec<f64> = time
+        .windows(2)
+        .map(|w| w[1] - w[0])
+        .filter(|d| *d > 0.0)
+        .collect();
+    let step = if steps.is_empty() {
+        1.0
+    } else {
+        median_in_place(&mut steps)
+    };
     let mut out = Recording {
         name: run.name.clone(),
         time: time.clone(),
@@ -106,7 +123,9 @@ pub fn recording(rig: &Rig, run: &Run) -> Recording {
         brake: brake(rig, run),
         moving: Vec::new(),
     };
-    let complete = [&out.wheel, &out.speed, &out.drag, &out.load].iter().all(|c| !c.signal.is_empty());
+    let complete = [&out.wheel, &out.speed, &out.drag, &out.load]
+        .iter()
+        .all(|c| !c.signal.is_empty());
     if complete {
         out.moving = moving(&out);
     }
@@ -114,7 +133,13 @@ pub fn recording(rig: &Rig, run: &Run) -> Recording {
 }
 
 fn moving(run: &Recording) -> Vec<Range<usize>> {
-    let mut speeds: Vec<f64> = run.speed.clean.iter().copied().filter(|v| *v > SLOWEST_M_S).collect();
+    let mut speeds: Vec<f64> = run
+        .speed
+        .clean
+        .iter()
+        .copied()
+        .filter(|v| *v > SLOWEST_M_S)
+        .collect();
     if speeds.is_empty() {
         return Vec::new();
     }
@@ -125,7 +150,9 @@ fn moving(run: &Recording) -> Vec<Range<usize>> {
         breaks[k] = run.time[k] - run.time[k - 1] > (8.0 * run.step).max(0.05);
     }
     let finite = |k: usize| {
-        [&run.wheel, &run.speed, &run.drag, &run.load].iter().all(|c| c.clean[k].is_finite())
+        [&run.wheel, &run.speed, &run.drag, &run.load]
+            .iter()
+            .all(|c| c.clean[k].is_finite())
     };
     crate::cleaning::stretches(|k| finite(k) && run.speed.clean[k] > slowest, &breaks, 20)
 }

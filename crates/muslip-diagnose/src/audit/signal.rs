@@ -22,7 +22,8 @@ impl Signal {
                 readings.push((t, x));
             }
         }
-        let (Some(first), Some(last)) = (readings.first().copied(), readings.last().copied()) else {
+        let (Some(first), Some(last)) = (readings.first().copied(), readings.last().copied())
+        else {
             return Self::default();
         };
         let span = last.0 - first.0;
@@ -43,9 +44,12 @@ impl Signal {
                 place += 1;
             }
             let a = readings[place];
-            let slope = readings.get(place + 1).map_or(0.0, |b| (b.1 - a.1) / (b.0 - a.0));
+            let slope = readings
+                .get(place + 1)
+                .map_or(0.0, |b| (b.1 - a.1) / (b.0 - a.0));
             let ahead = until - a.0;
-            out.integral.push(done + ahead * (a.1 + 0.5 * slope * ahead));
+            out.integral
+                .push(done + ahead * (a.1 + 0.5 * slope * ahead));
         }
         out
     }
@@ -97,7 +101,8 @@ impl Signal {
         (0..count)
             .map(|k| {
                 let here = start + k as f64 * step;
-                (self.integral_at(here + 0.5 * width) - self.integral_at(here - 0.5 * width)) / width
+                (self.integral_at(here + 0.5 * width) - self.integral_at(here - 0.5 * width))
+                    / width
             })
             .collect()
     }

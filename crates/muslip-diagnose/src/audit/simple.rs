@@ -10,14 +10,23 @@ use crate::smooth::{difference_sigma, median_in_place};
 const STEP_SHARE: f64 = 0.5;
 
 fn quantised(name: &str, unit: &str, channels: &[&[f64]]) -> Option<Finding> {
-    let steps: Vec<(f64, f64)> = channels.iter().filter_map(|values| step_of(values)).collect();
+    let steps: Vec<(f64, f64)> = channels
+        .iter()
+        .filter_map(|values| step_of(values))
+        .collect();
     if 2 * steps.len() <= channels.len() {
         return None;
     }
     let mut values: Vec<f64> = steps.iter().map(|s| s.0).collect();
     let step = median_in_place(&mut values);
-    let mut noises: Vec<f64> = channels.iter().map(|values| difference_sigma(values)).collect();
-    let agree = values.iter().filter(|s| (*s / step - 1.0).abs() < 0.05).count();
+    let mut noises: Vec<f64> = channels
+        .iter()
+        .map(|values| difference_sigma(values))
+        .collect();
+    let agree = values
+        .iter()
+        .filter(|s| (*s / step - 1.0).abs() < 0.05)
+        .count();
     let seen = 2 * agree > channels.len() && step > STEP_SHARE * median_in_place(&mut noises);
     seen.then(|| {
         Finding::of(name, Word::Quantised, (step, 0.01 * step), unit)
@@ -27,12 +36,20 @@ fn quantised(name: &str, unit: &str, channels: &[&[f64]]) -> Option<Finding> {
 
 fn held<'a>(name: &str, channels: impl Iterator<Item = &'a Channel>) -> Option<Finding> {
     let channels: Vec<&Channel> = channels.filter(|c| !c.clean.is_empty()).collect();
-    let mut periods: Vec<f64> = channels.iter().filter_map(|c| c.hold).map(|h| h.period_s).collect();
+    let mut periods: Vec<f64> = channels
+        .iter()
+        .filter_map(|c| c.hold)
+        .map(|h| h.period_s)
+        .collect();
     if periods.is_empty() || 2 * periods.len() <= channels.len() {
         return None;
     }
     let period = median_in_place(&mut periods);
-    let spread = periods.iter().map(|p| (p - period).abs()).fold(0.0, f64::max) / periods.len() as f64;
+    let spread = periods
+        .iter()
+        .map(|p| (p - period).abs())
+        .fold(0.0, f64::max)
+        / periods.len() as f64;
     (spread < 0.1 * period).then(|| {
         Finding::of(name, Word::Held, (period, spread.max(0.005 * period)), "s").saying(format!(
             "{name} is renewed every {:.2} ms only and held in between.",
@@ -58,7 +75,13 @@ pub fn simple(runs: &[Run], recordings: &[Recording]) -> Vec<Finding> {
             quantised(name, unit, &values)
         })
         .collect();
-    out.extend(held("wheel_speed_rad_s", recordings.iter().map(|run| &run.wheel)));
-    out.extend(held("vehicle_speed_m_s", recordings.iter().map(|run| &run.speed)));
+    out.extend(held(
+        "wheel_speed_rad_s",
+        recordings.iter().map(|run| &run.wheel),
+    ));
+    out.extend(held(
+        "vehicle_speed_m_s",
+        recordings.iter().map(|run| &run.speed),
+    ));
     out
 }

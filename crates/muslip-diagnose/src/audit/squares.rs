@@ -207,8 +207,20 @@ pub fn refine(
             return None;
         }
         let variance = (sum / rows as f64).max(1e-300);
-        let slopes = slopes(|x| Some(balance.residual(x)), &whitener, &unknowns, &steps, &free)?;
-        let smooth = self::slopes(|x| balance.instrument(&unknowns, x), &whitener, &unknowns, &steps, &free);
+        let slopes = slopes(
+            |x| Some(balance.residual(x)),
+            &whitener,
+            &unknowns,
+            &steps,
+            &free,
+        )?;
+        let smooth = self::slopes(
+            |x| balance.instrument(&unknowns, x),
+            &whitener,
+            &unknowns,
+            &steps,
+            &free,
+        );
         let instrumental = smooth.is_some();
         let weights = smooth.as_ref().unwrap_or(&slopes);
         let blocks = block_sums(&white, weights, &slopes, variance);
@@ -234,9 +246,16 @@ pub fn refine(
             for (place, &i) in free.iter().enumerate() {
                 unknowns[i] -= step[place] / longest;
             }
-            let moved = free.iter().enumerate().map(|(p, &i)| (step[p] / steps[i]).abs()).fold(0.0, f64::max);
+            let moved = free
+                .iter()
+                .enumerate()
+                .map(|(p, &i)| (step[p] / steps[i]).abs())
+                .fold(0.0, f64::max);
             if moved < SETTLED {
-                return last.map(|estimate| Estimate { unknowns, ..estimate });
+                return last.map(|estimate| Estimate {
+                    unknowns,
+                    ..estimate
+                });
             }
             continue;
         }
@@ -248,8 +267,8 @@ pub fn refine(
             for (place, &i) in free.iter().enumerate() {
                 trial[i] -= share * step[place];
             }
-            let value =
-                sum_of(&whitener.apply(&balance.residual(&trial))) / variance + penalty(&trial, &prior);
+            let value = sum_of(&whitener.apply(&balance.residual(&trial))) / variance
+                + penalty(&trial, &prior);
             if value < before {
                 moved = before - value > 1e-3;
                 unknowns = trial;
@@ -260,8 +279,16 @@ pub fn refine(
         if !moved && pass + 1 < passes {
             // Converged: one more pass only for the figures at the end.
             return Some(last.map_or_else(
-                || Estimate { unknowns: unknowns.clone(), std: vec![f64::INFINITY; unknowns.len()], sum, rows },
-                |estimate| Estimate { unknowns: unknowns.clone(), ..estimate },
+                || Estimate {
+                    unknowns: unknowns.clone(),
+                    std: vec![f64::INFINITY; unknowns.len()],
+                    sum,
+                    rows,
+                },
+                |estimate| Estimate {
+                    unknowns: unknowns.clone(),
+                    ..estimate
+                },
             ));
         }
     }
@@ -314,8 +341,12 @@ fn block_sums(
     let count = slopes.len();
     (0..white.len())
         .map(|b| Sums {
-            slopes: DMatrix::from_fn(count, count, |i, j| dot(&weights[i][b], &slopes[j][b]) / variance),
-            weights: DMatrix::from_fn(count, count, |i, j| dot(&weights[i][b], &weights[j][b]) / variance),
+            slopes: DMatrix::from_fn(count, count, |i, j| {
+                dot(&weights[i][b], &slopes[j][b]) / variance
+            }),
+            weights: DMatrix::from_fn(count, count, |i, j| {
+                dot(&weights[i][b], &weights[j][b]) / variance
+            }),
             pull: DVector::from_fn(count, |i, _| dot(&weights[i][b], &white[b]) / variance),
         })
         .collect()
@@ -376,7 +407,11 @@ fn spread(
     let mut std = vec![0.0; unknowns.len()];
     for (place, &i) in free.iter().enumerate() {
         let white = white[(place, place)].max(0.0);
-        let pulls = if count > 1.0 { pulls[(place, place)].max(0.0) } else { 4.0 * white };
+        let pulls = if count > 1.0 {
+            pulls[(place, place)].max(0.0)
+        } else {
+            4.0 * white
+        };
         std[i] = white.max(pulls).sqrt();
     }
     std
@@ -392,13 +427,18 @@ mod tests {
         let mut x = 0.0;
         let series: Vec<f64> = (0..20_000)
             .map(|_| {
-                state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+                state = state
+                    .wrapping_mul(6364136223846793005)
+                    .wrapping_add(1442695040888963407);
                 let u = (state >> 11) as f64 / (1u64 << 53) as f64 - 0.5;
                 x = 0.8 * x + u;
                 x
             })
             .collect();
         let found = autoregression(&[series], 2);
-        assert!((found[0] - 0.8).abs() < 0.03 && found[1].abs() < 0.03, "{found:?}");
+        assert!(
+            (found[0] - 0.8).abs() < 0.03 && found[1].abs() < 0.03,
+            "{found:?}"
+        );
     }
 }

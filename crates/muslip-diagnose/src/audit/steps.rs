@@ -17,13 +17,21 @@ pub fn step_of(value: &[f64]) -> Option<(f64, f64)> {
     }
     differences.sort_by(f64::total_cmp);
     let decimals = decimals_of(value);
-    let coarse: Vec<f64> = differences.iter().copied().filter(|d| *d > LATTICE_DECIMALS * decimals).collect();
+    let coarse: Vec<f64> = differences
+        .iter()
+        .copied()
+        .filter(|d| *d > LATTICE_DECIMALS * decimals)
+        .collect();
     // What is left out must be a lattice point written differently, not half of the channel.
     if coarse.len() < 20 {
         return None;
     }
     let smallest = coarse[coarse.len() / 50];
-    let near: Vec<f64> = coarse.iter().copied().filter(|d| (0.75..1.4).contains(&(d / smallest))).collect();
+    let near: Vec<f64> = coarse
+        .iter()
+        .copied()
+        .filter(|d| (0.75..1.4).contains(&(d / smallest)))
+        .collect();
     let mut step = near.iter().sum::<f64>() / near.len() as f64;
     // From the smallest multiples to larger ones, as the step becomes known better.
     for most in [1.5, 3.5, 8.5, 20.5] {
@@ -43,19 +51,19 @@ pub fn step_of(value: &[f64]) -> Option<(f64, f64)> {
         .map(|d| (core::f64::consts::TAU * d / step).cos())
         .sum::<f64>()
         / coarse.iter().filter(|d| **d < 20.5 * step).count().max(1) as f64;
-    (step > LATTICE_DECIMALS * decimals && coherence > LATTICE_COHERENCE)
-        .then_some((step, (decimals / step).max(1e-4) * step / (coarse.len() as f64).sqrt()))
+    (step > LATTICE_DECIMALS * decimals && coherence > LATTICE_COHERENCE).then_some((
+        step,
+        (decimals / step).max(1e-4) * step / (coarse.len() as f64).sqrt(),
+    ))
 }
 
 /// The last decimal that a column is written with.
 fn decimals_of(value: &[f64]) -> f64 {
     let mut unit = 1.0;
     for _ in 0..9 {
-        let whole = value
-            .iter()
-            .filter(|x| x.is_finite())
-            .take(200)
-            .all(|x| (x / unit - (x / unit).round()).abs() < 1e-5 * (x / unit).abs().max(1.0) * 1e-3 + 1e-6);
+        let whole = value.iter().filter(|x| x.is_finite()).take(200).all(|x| {
+            (x / unit - (x / unit).round()).abs() < 1e-5 * (x / unit).abs().max(1.0) * 1e-3 + 1e-6
+        });
         if whole {
             return unit;
         }
@@ -70,7 +78,9 @@ mod tests {
 
     #[test]
     fn a_quantised_ramp_shows_its_step_and_a_plain_one_none() {
-        let plain: Vec<f64> = (0..3000).map(|k| 20.0 + (f64::from(k) * 0.37).sin() * 1.234_567 + f64::from(k) * 0.0013).collect();
+        let plain: Vec<f64> = (0..3000)
+            .map(|k| 20.0 + (f64::from(k) * 0.37).sin() * 1.234_567 + f64::from(k) * 0.0013)
+            .collect();
         assert!(step_of(&plain).is_none());
         let coarse: Vec<f64> = plain.iter().map(|x| (x / 0.13).round() * 0.13).collect();
         let (step, _) = step_of(&coarse).unwrap();

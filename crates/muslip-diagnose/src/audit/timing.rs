@@ -1,6 +1,8 @@
 //! Which speed is late, and by how much, from all balances.
 
-use super::constants::{FORM_S, FORM_SHARE, SPREAD_FACTOR, LEAST_DELAY_S, STEP_SHARE, TOLD_SIGMAS, UNKNOWN_DELAY_S};
+use super::constants::{
+    FORM_S, FORM_SHARE, LEAST_DELAY_S, SPREAD_FACTOR, STEP_SHARE, TOLD_SIGMAS, UNKNOWN_DELAY_S,
+};
 use super::finding::{Finding, Timing, Word};
 use super::hold::Hold;
 use super::law;
@@ -39,12 +41,19 @@ fn delay(estimate: &Estimate, place: usize, held: f64, step: f64) -> Timing {
     if !(std < UNKNOWN_DELAY_S) || !estimate.unknowns[place].is_finite() {
         return Timing::UNKNOWN;
     }
-    Timing { value: estimate.unknowns[place] + held, std }
+    Timing {
+        value: estimate.unknowns[place] + held,
+        std,
+    }
 }
 
 fn median_of(runs: &[Recording], pick: impl Fn(&Recording) -> f64) -> f64 {
     let mut values: Vec<f64> = runs.iter().map(pick).collect();
-    if values.is_empty() { 0.0 } else { median_in_place(&mut values) }
+    if values.is_empty() {
+        0.0
+    } else {
+        median_in_place(&mut values)
+    }
 }
 
 /// By how much a held channel is later than its renewals as they are seen, s: half a period, less the half sampling step
@@ -60,22 +69,32 @@ pub fn timings(rig: &Rig, runs: &[Recording]) -> Timings {
     let step = median_of(runs, |run| run.step);
     let held_wheel = median_of(runs, |run| waiting(run, run.wheel.hold));
     let held_speed = median_of(runs, |run| waiting(run, run.speed.hold));
-    if rig.coasting && let Some((estimate, left)) = vehicle(runs, rig.mass_kg) {
+    if rig.coasting
+        && let Some((estimate, left)) = vehicle(runs, rig.mass_kg)
+    {
         out.vehicle_left = Some(left);
         out.vehicle = delay(&estimate, 1, held_speed, step);
         out.vehicle_moment = Some((estimate.unknowns[2], estimate.std[2]));
         out.estimates[0] = Some(estimate);
     }
-    let known = Timing { value: out.vehicle.value - held_speed, ..out.vehicle };
+    let known = Timing {
+        value: out.vehicle.value - held_speed,
+        ..out.vehicle
+    };
     if let Some(estimate) = law::law(rig, runs, known, out.vehicle_moment.map_or(0.0, |m| m.0)) {
-        out.wheel = out.wheel.with(delay(&estimate, law::WHEEL, held_wheel, step));
+        out.wheel = out
+            .wheel
+            .with(delay(&estimate, law::WHEEL, held_wheel, step));
         if !out.vehicle.std.is_finite() {
             out.vehicle = delay(&estimate, law::VEHICLE, held_speed, step);
         }
         out.wheel_moment = Some((estimate.unknowns[law::MOMENT], estimate.std[law::MOMENT]));
         out.estimates[2] = Some(estimate);
     }
-    let known = Timing { value: out.wheel.value - held_wheel, ..out.wheel };
+    let known = Timing {
+        value: out.wheel.value - held_wheel,
+        ..out.wheel
+    };
     if let Some(estimate) = wheel(rig, runs, known) {
         out.wheel = out.wheel.with(delay(&estimate, 2, held_wheel, step));
         out.brake = delay(&estimate, 3, 0.0, step);
@@ -94,7 +113,9 @@ pub fn findings(timings: &Timings, brake: &str) -> Vec<Finding> {
     ]
     .into_iter()
     .filter(|(channel, timing)| {
-        !channel.is_empty() && timing.std.is_finite() && timing.value.abs() > LEAST_DELAY_S.max(TOLD_SIGMAS * timing.std)
+        !channel.is_empty()
+            && timing.std.is_finite()
+            && timing.value.abs() > LEAST_DELAY_S.max(TOLD_SIGMAS * timing.std)
     })
     .map(|(channel, timing)| {
         let how = if timing.value > 0.0 { "late" } else { "early" };

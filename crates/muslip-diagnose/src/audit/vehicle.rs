@@ -1,6 +1,8 @@
 //! The vehicle's balance in level form: v(t) against the drag's impulse, and what it says of the vehicle speed's delay.
 
-use super::constants::{COARSE_STEP_S, FEWEST_BLOCKS, MOST_ROWS, SHORTEST_BLOCK_S, VEHICLE_RANGE_S, VEHICLE_STEP_S};
+use super::constants::{
+    COARSE_STEP_S, FEWEST_BLOCKS, MOST_ROWS, SHORTEST_BLOCK_S, VEHICLE_RANGE_S, VEHICLE_STEP_S,
+};
 use super::recording::{Block, Recording, blocks};
 use super::signal::low_pass;
 use super::squares::{Balance, Estimate, colour_of, refine, rest, scan_value};
@@ -22,7 +24,11 @@ const CURVATURE_S: f64 = 0.03;
 /// Splits a signed second moment into the time constants of the first channel's and the second channel's filter.
 pub(super) fn constants_of(moment: f64) -> (f64, f64) {
     let size = moment.abs().sqrt();
-    if moment > 0.0 { (size, 0.0) } else { (0.0, size) }
+    if moment > 0.0 {
+        (size, 0.0)
+    } else {
+        (0.0, size)
+    }
 }
 
 impl Vehicle<'_> {
@@ -51,8 +57,14 @@ pub(super) fn impulse_like(
     if moment >= 0.0 {
         return low_pass(&levels, step, slower);
     }
-    let ahead = run.drag.signal.averages(from + 0.5 * CURVATURE_S, step, count, CURVATURE_S);
-    let behind = run.drag.signal.averages(from - 0.5 * CURVATURE_S, step, count, CURVATURE_S);
+    let ahead = run
+        .drag
+        .signal
+        .averages(from + 0.5 * CURVATURE_S, step, count, CURVATURE_S);
+    let behind = run
+        .drag
+        .signal
+        .averages(from - 0.5 * CURVATURE_S, step, count, CURVATURE_S);
     for ((level, a), b) in levels.iter_mut().zip(ahead).zip(behind) {
         *level += 0.5 * moment * (a - b) / CURVATURE_S;
     }
@@ -67,7 +79,11 @@ impl Balance for Vehicle<'_> {
             .map(|block| {
                 let (speed, impulse) = self.series(block, unknowns[1], unknowns[2]);
                 let zero = impulse.first().copied().unwrap_or(0.0);
-                speed.iter().zip(&impulse).map(|(v, i)| v + scale * (i - zero)).collect()
+                speed
+                    .iter()
+                    .zip(&impulse)
+                    .map(|(v, i)| v + scale * (i - zero))
+                    .collect()
             })
             .collect()
     }
@@ -77,7 +93,10 @@ impl Balance for Vehicle<'_> {
     }
 
     fn own(&self, _: &[f64]) -> Vec<Vec<Vec<f64>>> {
-        self.blocks.iter().map(|block| powers(block.count, 3)).collect()
+        self.blocks
+            .iter()
+            .map(|block| powers(block.count, 3))
+            .collect()
     }
 
     fn steps(&self) -> Vec<f64> {
@@ -93,7 +112,11 @@ impl Balance for Vehicle<'_> {
 pub(super) fn powers(count: usize, how_many: i32) -> Vec<Vec<f64>> {
     let half = 0.5 * count.max(2) as f64;
     (0..how_many)
-        .map(|power| (0..count).map(|k| ((k as f64 - half) / half).powi(power)).collect())
+        .map(|power| {
+            (0..count)
+                .map(|k| ((k as f64 - half) / half).powi(power))
+                .collect()
+        })
         .collect()
 }
 
@@ -112,13 +135,22 @@ pub fn vehicle(runs: &[Recording], mass: f64) -> Option<(Estimate, Left)> {
     let stretches: Vec<(usize, f64, f64)> = runs
         .iter()
         .enumerate()
-        .flat_map(|(r, run)| run.moving.iter().map(move |m| (r, run.time[m.start], run.time[m.end - 1])))
+        .flat_map(|(r, run)| {
+            run.moving
+                .iter()
+                .map(move |m| (r, run.time[m.start], run.time[m.end - 1]))
+        })
         .collect();
     let whole: f64 = stretches.iter().map(|(_, a, b)| b - a).sum();
     let step = VEHICLE_STEP_S.max(whole / MOST_ROWS as f64);
     let balance = Vehicle {
         runs,
-        blocks: blocks(&stretches, step, (0.05, 0.05), (FEWEST_BLOCKS, 5.0, SHORTEST_BLOCK_S)),
+        blocks: blocks(
+            &stretches,
+            step,
+            (0.05, 0.05),
+            (FEWEST_BLOCKS, 5.0, SHORTEST_BLOCK_S),
+        ),
         mass,
         step,
     };
@@ -135,11 +167,20 @@ pub fn vehicle(runs: &[Recording], mass: f64) -> Option<(Estimate, Left)> {
         })
         .min_by(|a, b| a.0.total_cmp(&b.0))?
         .1;
-    let mut at = refine(&balance, &[1.0, best, 0.0], &[0.95], 4, &[false, false, true])?;
+    let mut at = refine(
+        &balance,
+        &[1.0, best, 0.0],
+        &[0.95],
+        4,
+        &[false, false, true],
+    )?;
     for _ in 0..3 {
         let colour = colour_of(&balance, &at.unknowns);
         at = refine(&balance, &at.unknowns, &colour, 4, &[false; 3])?;
     }
-    let left = Left { residual: rest(&balance, &at.unknowns), step };
+    let left = Left {
+        residual: rest(&balance, &at.unknowns),
+        step,
+    };
     Some((at, left))
 }

@@ -1,6 +1,8 @@
 //! The wheel's balance in level form: J ω(t) against the impulses of drag and brake.
 
-use super::constants::{MOMENT_S2, COARSE_STEP_S, FEWEST_BLOCKS, MOST_ROWS, WHEEL_RANGE_S, WHEEL_STEP_S};
+use super::constants::{
+    COARSE_STEP_S, FEWEST_BLOCKS, MOMENT_S2, MOST_ROWS, WHEEL_RANGE_S, WHEEL_STEP_S,
+};
 use super::finding::Timing;
 use super::recording::{Block, Recording, blocks};
 use super::signal::low_pass;
@@ -26,12 +28,21 @@ const INSTRUMENT_S: f64 = 0.04;
 
 impl Wheel<'_> {
     fn each(&self, of: impl Fn(&Recording, &Block) -> Vec<f64>) -> Vec<Vec<f64>> {
-        self.blocks.iter().map(|block| of(&self.runs[block.run], block)).collect()
+        self.blocks
+            .iter()
+            .map(|block| of(&self.runs[block.run], block))
+            .collect()
     }
 
     /// Wheel speed less both impulses; where a delay is given, the impulses' sum is that wheel speed smoothed, so that
     /// the force channels' noise is not in it.
-    fn imbalance(&self, run: &Recording, block: &Block, x: &[f64], smoothed: Option<&[f64]>) -> Vec<f64> {
+    fn imbalance(
+        &self,
+        run: &Recording,
+        block: &Block,
+        x: &[f64],
+        smoothed: Option<&[f64]>,
+    ) -> Vec<f64> {
         let (slower, faster) = constants_of(x[4]);
         let shift = x[2] - slower + faster;
         let ahead = (RUN_UP_S / self.step) as usize;
@@ -47,16 +58,27 @@ impl Wheel<'_> {
         };
         let brake = brake_at(x[3]);
         let level: Vec<f64> = if let Some(base) = smoothed {
-            let wheel = run.wheel.signal.averages(start - shift + base[2], self.step, count, INSTRUMENT_S);
+            let wheel =
+                run.wheel
+                    .signal
+                    .averages(start - shift + base[2], self.step, count, INSTRUMENT_S);
             let kept = brake_at(base[3]);
-            (0..count).map(|k| x[0] * (wheel[k] + base[1] * kept[k] - x[1] * brake[k])).collect()
+            (0..count)
+                .map(|k| x[0] * (wheel[k] + base[1] * kept[k] - x[1] * brake[k]))
+                .collect()
         } else {
             let drag = run.drag.signal.levels(start - shift, self.step, count);
             let share = self.rig.radius_m / inertia;
-            (0..count).map(|k| x[0] * (share * (drag[k] - drag[0]) - x[1] * brake[k])).collect()
+            (0..count)
+                .map(|k| x[0] * (share * (drag[k] - drag[0]) - x[1] * brake[k]))
+                .collect()
         };
         let level = low_pass(&level, self.step, slower);
-        let omega = low_pass(&run.wheel.signal.means(start, self.step, count), self.step, faster);
+        let omega = low_pass(
+            &run.wheel.signal.means(start, self.step, count),
+            self.step,
+            faster,
+        );
         (ahead..count).map(|k| omega[k] - level[k]).collect()
     }
 }
@@ -71,7 +93,10 @@ impl Balance for Wheel<'_> {
     }
 
     fn own(&self, _: &[f64]) -> Vec<Vec<Vec<f64>>> {
-        self.blocks.iter().map(|block| powers(block.count, 3)).collect()
+        self.blocks
+            .iter()
+            .map(|block| powers(block.count, 3))
+            .collect()
     }
 
     fn steps(&self) -> Vec<f64> {
@@ -79,14 +104,24 @@ impl Balance for Wheel<'_> {
     }
 
     fn prior(&self) -> Vec<(f64, f64)> {
-        vec![(1.0, 0.05), (1.0, 0.3), (0.0, f64::INFINITY), (0.0, f64::INFINITY), (0.0, MOMENT_S2)]
+        vec![
+            (1.0, 0.05),
+            (1.0, 0.3),
+            (0.0, f64::INFINITY),
+            (0.0, f64::INFINITY),
+            (0.0, MOMENT_S2),
+        ]
     }
 }
 
 /// Stretches in which the wheel turns and moves freely of its stop, in s.
 fn turning(rig: &Rig, runs: &[Recording]) -> Vec<(usize, f64, f64)> {
     let mut out = Vec::new();
-    for (r, run) in runs.iter().enumerate().filter(|(_, run)| run.brake.is_some()) {
+    for (r, run) in runs
+        .iter()
+        .enumerate()
+        .filter(|(_, run)| run.brake.is_some())
+    {
         for moving in &run.moving {
             let mut from = None;
             for k in moving.clone() {
@@ -129,7 +164,9 @@ pub fn wheel(rig: &Rig, runs: &[Recording], known: Timing) -> Option<Estimate> {
         vec![known.value]
     } else {
         let count = ((WHEEL_RANGE_S.1 - WHEEL_RANGE_S.0) / COARSE_STEP_S).round() as usize;
-        (0..=count).map(|k| WHEEL_RANGE_S.0 + k as f64 * COARSE_STEP_S).collect()
+        (0..=count)
+            .map(|k| WHEEL_RANGE_S.0 + k as f64 * COARSE_STEP_S)
+            .collect()
     };
     let best = near
         .iter()
@@ -140,10 +177,22 @@ pub fn wheel(rig: &Rig, runs: &[Recording], known: Timing) -> Option<Estimate> {
         })
         .min_by(|a, b| a.0.total_cmp(&b.0))?;
     let start = [1.0, 1.0, best.1, best.2, 0.0];
-    let mut at = refine(&balance, &start, &[0.98], 4, &[false, false, false, false, true])?;
+    let mut at = refine(
+        &balance,
+        &start,
+        &[0.98],
+        4,
+        &[false, false, false, false, true],
+    )?;
     for _ in 0..3 {
         let colour = colour_of(&balance, &at.unknowns);
-        at = refine(&balance, &at.unknowns, &colour, 4, &[false, false, false, false, true])?;
+        at = refine(
+            &balance,
+            &at.unknowns,
+            &colour,
+            4,
+            &[false, false, false, false, true],
+        )?;
     }
     Some(at)
 }
