@@ -19,7 +19,9 @@ fn correlation(pairs: impl Iterator<Item = (f64, f64)> + Clone) -> (f64, f64) {
             s.2 + (p.0 - a) * (p.1 - b),
         )
     });
-    let value = if aa > 0.0 && bb > 0.0 {
+    // More than rounding makes of a constant.
+    let varies = |square: f64, mean: f64| square > 1e-20 * count * mean * mean && square > 0.0;
+    let value = if varies(aa, a) && varies(bb, b) {
         ab / (aa * bb).sqrt()
     } else {
         0.0

@@ -145,10 +145,10 @@ fn moving(run: &Recording) -> Vec<Range<usize>> {
     }
     let slowest = SLOWEST_M_S.max(SLOWEST_SHARE * median_in_place(&mut speeds));
     let n = run.time.len();
-    let mut breaks = vec![false; n];
-    for k in 1..n {
-        breaks[k] = run.time[k] - run.time[k - 1] > (8.0 * run.step).max(0.05);
-    }
+    let longest = (8.0 * run.step).max(0.05);
+    let breaks: Vec<bool> = (0..n)
+        .map(|k| k > 0 && run.time[k] - run.time[k - 1] > longest)
+        .collect();
     let finite = |k: usize| {
         [&run.wheel, &run.speed, &run.drag, &run.load]
             .iter()
