@@ -126,10 +126,21 @@ pub fn recording(rig: &Rig, run: &Run) -> Recording {
     let complete = [&out.wheel, &out.speed, &out.drag, &out.load]
         .iter()
         .all(|c| !c.signal.is_empty());
-    if complete {
+    // What never changes has no delay.
+    if complete && varies(&out.drag.clean) && varies(&out.wheel.clean) {
         out.moving = moving(&out);
     }
     out
+}
+
+fn varies(values: &[f64]) -> bool {
+    let (low, high) = values
+        .iter()
+        .filter(|x| x.is_finite())
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| {
+            (l.min(*x), h.max(*x))
+        });
+    high - low > 1e-9 * high.abs().max(low.abs())
 }
 
 fn moving(run: &Recording) -> Vec<Range<usize>> {
