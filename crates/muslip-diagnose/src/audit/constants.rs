@@ -1,0 +1,88 @@
+//! Every figure that the audit decides by, with what it is for.
+
+/// Step of the grid on which the vehicle's balance is compared, s: slower than any recorder's, faster than any brake.
+pub const VEHICLE_STEP_S: f64 = 0.010;
+/// Step of the grid on which wheel and tyre are compared, s: a wheel changes its speed within some 30 ms.
+pub const WHEEL_STEP_S: f64 = 0.006;
+/// Delays tried for the vehicle speed, s: a satellite receiver with its filter, hold and logger is 0.25 s late at most.
+pub const VEHICLE_RANGE_S: (f64, f64) = (-0.08, 0.28);
+/// Delays tried for the wheel speed and the brake, s.
+pub const WHEEL_RANGE_S: (f64, f64) = (-0.07, 0.07);
+/// Steps of the coarse scans, s: half the width of the valleys that the refinement falls into.
+pub const COARSE_STEP_S: f64 = 0.010;
+/// Most rows a balance uses; longer campaigns are thinned by runs.
+pub const MOST_ROWS: usize = 6_000;
+/// Order of the autoregression that whitens a balance's residual.
+pub const WHITENING_ORDER: usize = 6;
+/// Fewest stretches that the spread of a delay is judged by; runs are cut until there are as many.
+pub const FEWEST_BLOCKS: usize = 6;
+/// Shortest stretch that tells of a delay, s.
+pub const SHORTEST_BLOCK_S: f64 = 0.8;
+/// A finding is told from so many standard deviations.
+pub const TOLD_SIGMAS: f64 = 3.0;
+/// A delay is told from this size, s: what no engineer would correct is no finding.
+pub const LEAST_DELAY_S: f64 = 1e-3;
+/// A standard deviation of a delay beyond which nothing is known of it, s.
+pub const UNKNOWN_DELAY_S: f64 = 0.02;
+/// Share of a recording step by which any delay may be off: samplers are out of step by up to half of it.
+pub const STEP_SHARE: f64 = 0.1;
+/// Slowest speed at which slip is defined, m/s.
+pub const SLOWEST_M_S: f64 = 0.5;
+/// Slowest usable speed as a share of the median.
+pub const SLOWEST_SHARE: f64 = 0.15;
+/// Renewals that a held channel must show.
+pub const HELD_STEPS: usize = 8;
+/// Share of samples that repeat their predecessor in a held channel, at least.
+pub const HELD_REPEATS: f64 = 0.35;
+/// Standard deviation of what is expected of the second moment between two channels of a rig, s²: filters of 12 Hz.
+pub const MOMENT_S2: f64 = 1.5e-4;
+/// Width over which the vehicle's speed is averaged in the tyre's law, s: what is quicker is the drag's impulse.
+pub const SPEED_WIDTH_S: f64 = 0.25;
+/// Step at which channels are kept as integrals, s: a third of the finest grid.
+pub const KNOT_S: f64 = 0.002;
+/// Most knots of a channel; longer runs are kept more coarsely.
+pub const MOST_KNOTS: usize = 60_000;
+/// Width over which a held vehicle's speed is averaged for the instruments, s: it is only programmed to change slowly.
+pub const HELD_WIDTH_S: f64 = 0.7;
+/// Factor on the standard deviation of a delay: it is judged by half a dozen stretches (Student's quantile at two).
+pub const SPREAD_FACTOR: f64 = 1.3;
+/// What a delay may be off by because filters differ in shape from what they are taken for, s and as a share of it.
+pub const FORM_S: f64 = 3e-4;
+/// As [`FORM_S`].
+pub const FORM_SHARE: f64 = 0.04;
+/// Coherence with its period that a held channel's renewals must have, 0 to 1; chance gives less than a fifth.
+pub const HELD_COHERENCE: f64 = 0.45;
+/// Differences of a channel that its lattice is read off, at most.
+pub const LATTICE_VALUES: usize = 4000;
+/// A step is one of the channel from so many last decimals on.
+pub const LATTICE_DECIMALS: f64 = 2.5;
+/// Mean cosine of the differences over the step, at least; values on no lattice give nothing.
+pub const LATTICE_COHERENCE: f64 = 0.7;
+/// Correlation with the drag beyond which a column is the drag.
+pub const LEAK_SURE: f64 = 0.9995;
+/// The same where it copies the drag's noise as well.
+pub const LEAK_LEVEL: f64 = 0.98;
+/// Correlation of the noises from which a column copies it: two sensors' noises have none.
+pub const LEAK_COPIES: f64 = 0.25;
+/// Lowest frequency at which a line is looked for, Hz: brakes are worked at lower ones.
+pub const HUM_LOWEST_HZ: f64 = 12.0;
+/// A line's power against the median of its neighbours'.
+pub const LINE_RATIO: f64 = 15.0;
+/// An order's power against that beside it.
+pub const RIPPLE_RATIO: f64 = 5.0;
+/// Orders of the wheel's turning that are looked at.
+pub const ORDERS: [usize; 6] = [1, 2, 3, 4, 7, 11];
+/// Width of the smooth course that lines are looked for beside, s.
+pub const SMOOTH_S: f64 = 0.12;
+/// Relative change of the wheel speed over twice [`SMOOTH_S`] up to which it is calm.
+pub const CALM: f64 = 0.015;
+/// A filter is told from so many standard deviations of its second moment.
+pub const FILTER_SIGMAS: f64 = 5.0;
+/// Shortest time constant that is told, s.
+pub const LEAST_FILTER_S: f64 = 0.008;
+/// Share of the vehicle residual's variance that lasts longer than a few samples, from which its noise is coloured.
+pub const COLOURED_SHARE: f64 = 0.75;
+/// Longest time constant of a channel's noise, s: what lasts longer is physics or drift.
+pub const LONGEST_COLOUR_S: f64 = 0.7;
+/// Share of its free-rolling speed from which a wheel counts as rolling.
+pub const ROLLING_SHARE: f64 = 0.95;

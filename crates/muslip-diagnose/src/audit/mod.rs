@@ -1,0 +1,217 @@
+//! The audit of the measuring chain: what the channels' own timing, noise and resolution are, found before any physics.
+//!
+//! | question | module |
+//! | --- | --- |
+//! | when each channel tells what happened | [`timing`]: [`vehicle`], [`wheel`], [`law`], all by [`squares`] |
+//! | what is held, what moves in steps | [`hold`], [`steps`], [`simple`] |
+//! | narrow lines: hum, ripple | [`line`] |
+//! | what filters a channel passes | [`filter`] |
+//! | what is off at a standstill | [`still`] |
+//! | noise with a memory | [`colour`] |
+//! | columns made from the drag | [`leak`] |
+//! | what it says | [`finding`] |
+//! | by which figures it decides | [`constants`] |
+
+pub mod colour;
+pub mod constants;
+pub mod filter;
+pub mod finding;
+pub mod hold;
+pub mod law;
+pub mod leak;
+pub mod line;
+pub mod recording;
+pub mod signal;
+pub mod simple;
+pub mod squares;
+pub mod steps;
+pub mod still;
+pub mod timing;
+pub mod vehicle;
+pub mod wheel;
+
+pub use finding::{Finding, Timing, Word};
+
+use crate::campaign::{Rig, Run};
+use crate::smooth::{difference_sigma, median_in_place};
+use recording::{Recording, recording};
+use timing::{Timings, timings};
+
+/// What the audit found.
+#[derive(Clone, Debug, Default)]
+pub struct Audit {
+    /// Delay of the wheel speed against the drag.
+    pub wheel_late: Timing,
+    /// Delay of the vehicle speed against the drag.
+    pub vehicle_late: Timing,
+    /// Delay of the brake column against the drag.
+    pub brake_late: Timing,
+    /// The delays in detail.
+    pub timings: Timings,
+    /// Entries of `chain`.
+    pub findings: Vec<Finding>,
+}
+
+/// Slow noise of the vehicle speed, where its balance shows it.
+fn slow_noise(timings: &Timings, recordings: &[Recording]) -> Option<Finding> {
+    if recordings.iter().any(|run| run.speed.hold.is_some()) {
+        return None;
+    }
+    let left = timings.vehicle_left.as_ref()?;
+    let mut white: Vec<f64> = recordings
+        .iter()
+        .map(|run| difference_sigma(&run.speed.clean))
+        .collect();
+    colour::of_vehicle(&left.residual, left.step, median_in_place(&mut white))
+}
+
+/// Audits the measuring chain of a campaign.
+#[must_use]
+pub fn audit(rig: &Rig, runs: &[Run]) -> Audit {
+    let recordings: Vec<Recording> = runs.iter().map(|run| recording(rig, run)).collect();
+    let timings = timings(rig, &recordings);
+    let brake = recordings
+        .iter()
+        .find_map(|run| run.brake.as_ref())
+        .map_or("", |(name, _)| name);
+    let mut findings = timing::findings(&timings, brake);
+    findings.extend(simple::simple(runs, &recordings));
+    findings.extend(line::hum(&recordings));
+    findings.extend(line::ripple(&recordings));
+    findings.extend(leak::leaks(runs));
+    findings.extend(filter::filters(&timings, &recordings));
+    findings.extend(still::zero(&recordings));
+    findings.extend(slow_noise(&timings, &recordings));
+    Audit {
+        wheel_late: timings.wheel,
+        vehicle_late: timings.vehicle,
+        brake_late: timings.brake,
+        findings,
+        timings,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const MASS: f64 = 420.0;
+    const RADIUS: f64 = 0.31;
+
+    fn rig() -> Rig {
+        Rig {
+            radius_m: RADIUS,
+            wheel_inertia_kg_m2: 1.2,
+            mass_kg: MASS,
+            coasting: true,
+            peak_friction: 0.9,
+            critical_slip: 0.12,
+            ..Rig::default()
+        }
+    }
+
+    /// A coasting vehicle whose slip swings, its speeds read late by so many s.
+    fn run(phase: f64, wheel_late: f64, vehicle_late: f64) -> Run {
+        let (dt, count) = (1e-3, 8000);
+        let (mut v, mut state) = (30.0, 3u64);
+        let (mut speed, mut wheel, mut drag) = (Vec::new(), Vec::new(), Vec::new());
+        for k in 0..count {
+            let t = f64::from(k) * dt;
+            let s = 0.08 * (1.0 - (2.3 * t + phase).cos()) * (0.7 + 0.3 * (5.1 * t).sin());
+            let u = s / 0.12;
+            let force = 3500.0 * 0.9 * 2.0 * u / (1.0 + u * u);
+            speed.push(v);
+            wheel.push(v * (1.0 - s) / RADIUS);
+            drag.push(force);
+            v -= dt * force / MASS * 0.3;
+        }
+        let mut noise = |size: f64| {
+            state = state
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1_442_695_040_888_963_407);
+            size * ((state >> 11) as f64 / (1u64 << 53) as f64 - 0.5)
+        };
+        let late =
+            |x: &[f64], by: f64, k: i32| x[usize::try_from(k - (by / dt) as i32).unwrap_or(0)];
+        let rows = || 0..count;
+        Run {
+            name: "run".to_owned(),
+            time_s: rows().map(|k| f64::from(k) * dt).collect(),
+            wheel_speed_rad_s: rows()
+                .map(|k| late(&wheel, wheel_late, k) + noise(0.1))
+                .collect(),
+            vehicle_speed_m_s: rows()
+                .map(|k| late(&speed, vehicle_late, k) + noise(0.02))
+                .collect(),
+            drag_force_n: rows()
+                .map(|k| 0.3 * drag[k as usize] + noise(20.0))
+                .collect(),
+            normal_force_n: rows().map(|_| 0.3 * 3500.0).collect(),
+            ..Run::default()
+        }
+    }
+
+    #[test]
+    fn known_delays_are_found() {
+        let runs = [
+            run(0.0, 0.02, 0.05),
+            run(1.0, 0.02, 0.05),
+            run(2.0, 0.02, 0.05),
+        ];
+        let found = audit(&rig(), &runs);
+        assert!(
+            (found.wheel_late.value - 0.02).abs() < 1e-3,
+            "{:?}",
+            found.wheel_late
+        );
+        assert!(
+            (found.vehicle_late.value - 0.05).abs() < 2e-3,
+            "{:?}",
+            found.vehicle_late
+        );
+        let late = found
+            .findings
+            .iter()
+            .filter(|f| f.finding == Word::Late)
+            .count();
+        assert_eq!(late, 2, "{:?}", found.findings);
+    }
+
+    #[test]
+    fn in_step_and_white_says_nothing() {
+        let runs = [run(0.0, 0.0, 0.0), run(1.0, 0.0, 0.0), run(2.0, 0.0, 0.0)];
+        let found = audit(&rig(), &runs);
+        assert!(found.findings.is_empty(), "{:?}", found.findings);
+    }
+
+    #[test]
+    fn nothing_usable_is_no_reason_to_fail() {
+        assert!(audit(&rig(), &[]).findings.is_empty());
+        let of = |count: usize, value: f64| {
+            let column = vec![value; count];
+            Run {
+                time_s: (0..count).map(|k| k as f64 * 0.01).collect(),
+                wheel_speed_rad_s: column.clone(),
+                vehicle_speed_m_s: column.clone(),
+                drag_force_n: column.clone(),
+                normal_force_n: column.clone(),
+                brake_torque_nm: Some(column.clone()),
+                extra: vec![("x".to_owned(), column)],
+                ..Run::default()
+            }
+        };
+        for count in [0, 1, 2, 30, 1000] {
+            for value in [0.0, 1.0, 20.0, f64::NAN, 1e308, f64::INFINITY] {
+                let found = audit(&rig(), &[of(count, value), of(count, value)]);
+                assert!(
+                    found.findings.is_empty(),
+                    "{count} {value} {:?}",
+                    found.findings
+                );
+            }
+        }
+        let mut short = run(0.0, 0.0, 0.0);
+        short.drag_force_n.clear();
+        assert!(!audit(&rig(), &[short]).vehicle_late.std.is_finite());
+    }
+}

@@ -1,0 +1,186 @@
+//! The vehicle's balance in level form: v(t) against the drag's impulse, and what it says of the vehicle speed's delay.
+
+use super::constants::{
+    COARSE_STEP_S, FEWEST_BLOCKS, MOST_ROWS, SHORTEST_BLOCK_S, VEHICLE_RANGE_S, VEHICLE_STEP_S,
+};
+use super::recording::{Block, Recording, blocks};
+use super::signal::low_pass;
+use super::squares::{Balance, Estimate, colour_of, refine, rest, scan_value};
+
+/// Unknowns: scale of the drag's impulse, delay in s, and signed square of the time constant by which v is slower, s².
+struct Vehicle<'a> {
+    runs: &'a [Recording],
+    blocks: Vec<Block>,
+    mass: f64,
+    step: f64,
+}
+
+/// Seconds read ahead of a block, in which filters forget where they started.
+const RUN_UP_S: f64 = 0.4;
+
+/// Width over which the drag is averaged on either side for its slope, s.
+const CURVATURE_S: f64 = 0.03;
+
+/// Splits a signed second moment into the time constants of the first channel's and the second channel's filter.
+pub(super) fn constants_of(moment: f64) -> (f64, f64) {
+    let size = moment.abs().sqrt();
+    if moment > 0.0 {
+        (size, 0.0)
+    } else {
+        (0.0, size)
+    }
+}
+
+impl Vehicle<'_> {
+    fn series(&self, block: &Block, delay: f64, moment: f64) -> (Vec<f64>, Vec<f64>) {
+        let run = &self.runs[block.run];
+        let ahead = (RUN_UP_S / self.step) as usize;
+        let start = block.start - ahead as f64 * self.step;
+        let count = block.count + ahead;
+        let impulse = impulse_like(run, (start, self.step, count), delay, moment);
+        let speed = run.speed.signal.means(start, self.step, count);
+        (speed[ahead..].to_vec(), impulse[ahead..].to_vec())
+    }
+}
+
+/// The drag's impulse later by a delay, and slower by a second moment: through a pole, or sharpened where that is
+/// negative. The vehicle speed is never filtered: that would only take its noise away.
+pub(super) fn impulse_like(
+    run: &Recording,
+    (start, step, count): (f64, f64, usize),
+    delay: f64,
+    moment: f64,
+) -> Vec<f64> {
+    let (slower, _) = constants_of(moment);
+    let from = start - delay + slower;
+    let mut levels = run.drag.signal.levels(from, step, count);
+    if moment >= 0.0 {
+        return low_pass(&levels, step, slower);
+    }
+    let ahead = run
+        .drag
+        .signal
+        .averages(from + 0.5 * CURVATURE_S, step, count, CURVATURE_S);
+    let behind = run
+        .drag
+        .signal
+        .averages(from - 0.5 * CURVATURE_S, step, count, CURVATURE_S);
+    for ((level, a), b) in levels.iter_mut().zip(ahead).zip(behind) {
+        *level += 0.5 * moment * (a - b) / CURVATURE_S;
+    }
+    levels
+}
+
+impl Balance for Vehicle<'_> {
+    fn residual(&self, unknowns: &[f64]) -> Vec<Vec<f64>> {
+        let scale = unknowns[0] / self.mass;
+        self.blocks
+            .iter()
+            .map(|block| {
+                let (speed, impulse) = self.series(block, unknowns[1], unknowns[2]);
+                let zero = impulse.first().copied().unwrap_or(0.0);
+                speed
+                    .iter()
+                    .zip(&impulse)
+                    .map(|(v, i)| v + scale * (i - zero))
+                    .collect()
+            })
+            .collect()
+    }
+
+    fn instrument(&self, _: &[f64], _: &[f64]) -> Option<Vec<Vec<f64>>> {
+        None
+    }
+
+    fn own(&self, _: &[f64]) -> Vec<Vec<Vec<f64>>> {
+        self.blocks
+            .iter()
+            .map(|block| powers(block.count, 3))
+            .collect()
+    }
+
+    fn steps(&self) -> Vec<f64> {
+        vec![1e-3, 1e-3, 1e-4]
+    }
+
+    fn prior(&self) -> Vec<(f64, f64)> {
+        vec![(1.0, 1.0), (0.0, f64::INFINITY), (0.0, 0.02)]
+    }
+}
+
+/// Powers 0, 1, ... of time over a block, scaled to -1..1.
+pub(super) fn powers(count: usize, how_many: i32) -> Vec<Vec<f64>> {
+    let half = 0.5 * count.max(2) as f64;
+    (0..how_many)
+        .map(|power| {
+            (0..count)
+                .map(|k| ((k as f64 - half) / half).powi(power))
+                .collect()
+        })
+        .collect()
+}
+
+/// What the balance leaves, in m/s, on an even grid.
+#[derive(Clone, Debug, Default)]
+pub struct Left {
+    /// Residuals of each stretch.
+    pub residual: Vec<Vec<f64>>,
+    /// Step of the grid in s.
+    pub step: f64,
+}
+
+/// What the balance says: delay of v against the drag, and by what filter it is slower.
+#[must_use]
+pub fn vehicle(runs: &[Recording], mass: f64) -> Option<(Estimate, Left)> {
+    let stretches: Vec<(usize, f64, f64)> = runs
+        .iter()
+        .enumerate()
+        .flat_map(|(r, run)| {
+            run.moving
+                .iter()
+                .map(move |m| (r, run.time[m.start], run.time[m.end - 1]))
+        })
+        .collect();
+    let whole: f64 = stretches.iter().map(|(_, a, b)| b - a).sum();
+    let step = VEHICLE_STEP_S.max(whole / MOST_ROWS as f64);
+    let balance = Vehicle {
+        runs,
+        blocks: blocks(
+            &stretches,
+            step,
+            (0.05, 0.05),
+            (FEWEST_BLOCKS, 5.0, SHORTEST_BLOCK_S),
+        ),
+        mass,
+        step,
+    };
+    if balance.blocks.is_empty() || !(mass > 0.0) {
+        return None;
+    }
+    // Coarsely: differences, and the scale as it comes.
+    let count = ((VEHICLE_RANGE_S.1 - VEHICLE_RANGE_S.0) / COARSE_STEP_S).round() as usize;
+    let best = (0..=count)
+        .filter_map(|k| {
+            let delay = VEHICLE_RANGE_S.0 + k as f64 * COARSE_STEP_S;
+            let value = scan_value(&balance, &[1.0, delay, 0.0], &[0.95]);
+            value.is_finite().then_some((value, delay))
+        })
+        .min_by(|a, b| a.0.total_cmp(&b.0))?
+        .1;
+    let mut at = refine(
+        &balance,
+        &[1.0, best, 0.0],
+        &[0.95],
+        4,
+        &[false, false, true],
+    )?;
+    for _ in 0..3 {
+        let colour = colour_of(&balance, &at.unknowns);
+        at = refine(&balance, &at.unknowns, &colour, 4, &[false; 3])?;
+    }
+    let left = Left {
+        residual: rest(&balance, &at.unknowns),
+        step,
+    };
+    Some((at, left))
+}

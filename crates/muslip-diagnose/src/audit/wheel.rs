@@ -1,0 +1,198 @@
+//! The wheel's balance in level form: J ω(t) against the impulses of drag and brake.
+
+use super::constants::{
+    COARSE_STEP_S, FEWEST_BLOCKS, MOMENT_S2, MOST_ROWS, WHEEL_RANGE_S, WHEEL_STEP_S,
+};
+use super::finding::Timing;
+use super::recording::{Block, Recording, blocks};
+use super::signal::low_pass;
+use super::squares::{Balance, Estimate, colour_of, refine, scan_value};
+use super::vehicle::{constants_of, powers};
+use crate::campaign::Rig;
+
+/// Unknowns: scale of both impulses, the brake's against the drag's, delay of ω and of the brake in s, second moment by which
+/// ω is slower in s².
+struct Wheel<'a> {
+    runs: &'a [Recording],
+    blocks: Vec<Block>,
+    rig: &'a Rig,
+    step: f64,
+}
+
+/// Delays of the brake that the refinement starts from, s.
+const BRAKES_S: [f64; 5] = [0.0, -0.02, -0.01, 0.01, 0.02];
+/// Seconds read ahead of a block.
+const RUN_UP_S: f64 = 0.15;
+/// Width over which the wheel speed is averaged for the instruments, s.
+const INSTRUMENT_S: f64 = 0.04;
+
+impl Wheel<'_> {
+    fn each(&self, of: impl Fn(&Recording, &Block) -> Vec<f64>) -> Vec<Vec<f64>> {
+        self.blocks
+            .iter()
+            .map(|block| of(&self.runs[block.run], block))
+            .collect()
+    }
+
+    /// Wheel speed less both impulses; where a delay is given, the impulses' sum is that wheel speed smoothed, so that
+    /// the force channels' noise is not in it.
+    fn imbalance(
+        &self,
+        run: &Recording,
+        block: &Block,
+        x: &[f64],
+        smoothed: Option<&[f64]>,
+    ) -> Vec<f64> {
+        let (slower, faster) = constants_of(x[4]);
+        let shift = x[2] - slower + faster;
+        let ahead = (RUN_UP_S / self.step) as usize;
+        let start = block.start - ahead as f64 * self.step;
+        let count = block.count + ahead;
+        let inertia = self.rig.wheel_inertia_kg_m2;
+        let brake_at = |late: f64| -> Vec<f64> {
+            let Some((_, brake)) = &run.brake else {
+                return vec![0.0; count];
+            };
+            let level = brake.signal.levels(start - shift + late, self.step, count);
+            level.iter().map(|l| (l - level[0]) / inertia).collect()
+        };
+        let brake = brake_at(x[3]);
+        let level: Vec<f64> = if let Some(base) = smoothed {
+            let wheel =
+                run.wheel
+                    .signal
+                    .averages(start - shift + base[2], self.step, count, INSTRUMENT_S);
+            let kept = brake_at(base[3]);
+            (0..count)
+                .map(|k| x[0] * (wheel[k] + base[1] * kept[k] - x[1] * brake[k]))
+                .collect()
+        } else {
+            let drag = run.drag.signal.levels(start - shift, self.step, count);
+            let share = self.rig.radius_m / inertia;
+            (0..count)
+                .map(|k| x[0] * (share * (drag[k] - drag[0]) - x[1] * brake[k]))
+                .collect()
+        };
+        let level = low_pass(&level, self.step, slower);
+        let omega = low_pass(
+            &run.wheel.signal.means(start, self.step, count),
+            self.step,
+            faster,
+        );
+        (ahead..count).map(|k| omega[k] - level[k]).collect()
+    }
+}
+
+impl Balance for Wheel<'_> {
+    fn residual(&self, x: &[f64]) -> Vec<Vec<f64>> {
+        self.each(|run, block| self.imbalance(run, block, x, None))
+    }
+
+    fn instrument(&self, base: &[f64], x: &[f64]) -> Option<Vec<Vec<f64>>> {
+        Some(self.each(|run, block| self.imbalance(run, block, x, Some(base))))
+    }
+
+    fn own(&self, _: &[f64]) -> Vec<Vec<Vec<f64>>> {
+        self.blocks
+            .iter()
+            .map(|block| powers(block.count, 3))
+            .collect()
+    }
+
+    fn steps(&self) -> Vec<f64> {
+        vec![1e-3, 1e-3, 5e-4, 5e-4, 2.5e-5]
+    }
+
+    fn prior(&self) -> Vec<(f64, f64)> {
+        vec![
+            (1.0, 0.05),
+            (1.0, 0.3),
+            (0.0, f64::INFINITY),
+            (0.0, f64::INFINITY),
+            (0.0, MOMENT_S2),
+        ]
+    }
+}
+
+/// Stretches in which the wheel turns and moves freely of its stop, in s.
+fn turning(rig: &Rig, runs: &[Recording]) -> Vec<(usize, f64, f64)> {
+    let mut out = Vec::new();
+    for (r, run) in runs
+        .iter()
+        .enumerate()
+        .filter(|(_, run)| run.brake.is_some())
+    {
+        for moving in &run.moving {
+            let mut from = None;
+            for k in moving.clone() {
+                let free = run.wheel.clean[k] * rig.radius_m > 0.05 * run.speed.clean[k];
+                if free && from.is_none() {
+                    from = Some(k);
+                }
+                if let Some(start) = from
+                    && (!free || k + 1 == moving.end)
+                {
+                    out.push((r, run.time[start], run.time[k]));
+                    from = None;
+                }
+            }
+        }
+    }
+    out
+}
+
+/// What the balance says, given what the law says of the wheel speed before any hold.
+#[must_use]
+pub fn wheel(rig: &Rig, runs: &[Recording], known: Timing) -> Option<Estimate> {
+    if !(rig.wheel_inertia_kg_m2 > 0.0 && rig.radius_m > 0.0) {
+        return None;
+    }
+    let stretches = turning(rig, runs);
+    let whole: f64 = stretches.iter().map(|(_, a, b)| b - a).sum();
+    let step = WHEEL_STEP_S.max(whole / MOST_ROWS as f64);
+    let balance = Wheel {
+        runs,
+        blocks: blocks(&stretches, step, (0.08, 0.08), (FEWEST_BLOCKS, 2.0, 0.3)),
+        rig,
+        step,
+    };
+    if balance.blocks.is_empty() {
+        return None;
+    }
+    // Where the law knows the delay, from there; else from a scan. The brake's may be any of a rack's.
+    let near: Vec<f64> = if known.std.is_finite() {
+        vec![known.value]
+    } else {
+        let count = ((WHEEL_RANGE_S.1 - WHEEL_RANGE_S.0) / COARSE_STEP_S).round() as usize;
+        (0..=count)
+            .map(|k| WHEEL_RANGE_S.0 + k as f64 * COARSE_STEP_S)
+            .collect()
+    };
+    let best = near
+        .iter()
+        .flat_map(|&wheel| BRAKES_S.map(|brake| (wheel, brake)))
+        .filter_map(|(wheel, brake)| {
+            let value = scan_value(&balance, &[1.0, 1.0, wheel, brake, 0.0], &[0.98]);
+            value.is_finite().then_some((value, wheel, brake))
+        })
+        .min_by(|a, b| a.0.total_cmp(&b.0))?;
+    let start = [1.0, 1.0, best.1, best.2, 0.0];
+    let mut at = refine(
+        &balance,
+        &start,
+        &[0.98],
+        4,
+        &[false, false, false, false, true],
+    )?;
+    for _ in 0..3 {
+        let colour = colour_of(&balance, &at.unknowns);
+        at = refine(
+            &balance,
+            &at.unknowns,
+            &colour,
+            4,
+            &[false, false, false, false, true],
+        )?;
+    }
+    Some(at)
+}
