@@ -4,11 +4,12 @@ use rayon::prelude::*;
 
 use crate::data::Data;
 use crate::innovations::candidates::{Candidate, Table, table};
+use crate::innovations::dependence::{self, Dependence};
 use crate::innovations::hypothesis::{Effort, Judged, capped, judge, table_grams, total};
 use crate::innovations::noise::Slopes;
 use crate::innovations::rows::rows;
 use crate::innovations::screen::{Score, scores};
-use crate::mechanism::{Evidence, Id};
+use crate::mechanism::{Balance, Evidence, Id};
 use crate::model::{Model, Term};
 
 /// Price of a free parameter in nats: about half the logarithm of the independent readings.
@@ -16,27 +17,62 @@ const PRICE_OF_PARAMETER: f64 = 4.0;
 /// Price of a choice among the vocabulary in nats.
 const PRICE_OF_NAME: f64 = 3.4;
 /// Least gain in nats, all prices taken off.
-const LEAST_GAIN: f64 = 6.0;
+const LEAST_GAIN: f64 = 8.0;
+/// Least effect that is worth a name, as a share of one whitened reading's standard deviation: of the gain, half
+/// its square a reading.
+const LEAST_EFFECT: f64 = 0.07;
 /// Least t of the gains on unseen runs.
 const LEAST_T: f64 = 1.7;
+/// A free dependence is said instead of a mechanism where it gains so many times as much, and so many nats more.
+const DEPENDENCE_SHARE: f64 = 1.1;
+const DEPENDENCE_NATS: f64 = 15.0;
+/// Least share by which a name that works through the force lowers the drag's residual.
+const LEAST_LOWERED: f64 = 0.02;
+/// Least memory in s that is told from a chain without any error of timing.
+const LEAST_MEMORY_S: f64 = 1.5e-3;
 /// Finalists that are judged in each round, from each of the two screens.
-const FINALISTS: [usize; 2] = [4, 2];
+const FINALISTS: [usize; 2] = [4, 1];
 /// Most names.
 const MOST_NAMES: usize = 3;
 
-/// A mechanism as it stands against the model without it.
+/// What a trial adds to a model.
+#[derive(Clone)]
+pub enum Claim {
+    /// A mechanism of the vocabulary, by its entry of the catalogue.
+    Mechanism(Id, usize),
+    /// A free dependence on a variable.
+    Dependence(Dependence),
+}
+
+/// A claim as it stands against the model without it.
 #[derive(Clone)]
 pub struct Trial {
     /// Which.
-    pub id: Id,
-    /// Entry of the catalogue.
-    pub entry: usize,
+    pub claim: Claim,
     /// Gain in nats, prices taken off.
     pub gain: f64,
     /// Mean gain on unseen runs in nats, and its t over the runs.
     pub unseen: (f64, f64),
+    /// Share by which the root mean square of the drag's residual falls; `None` where it does not work through the
+    /// force.
+    pub lowered: Option<f64>,
+    /// Whether its memory is longer than what the chain's own timing was off by.
+    pub outlasts_chain: bool,
+    /// Readings in the balances that are judged.
+    pub readings: usize,
     /// The model with it.
     pub judged: Judged,
+}
+
+impl Trial {
+    /// The mechanism, where it is one.
+    #[must_use]
+    pub fn mechanism(&self) -> Option<(Id, usize)> {
+        match &self.claim {
+            Claim::Mechanism(id, entry) => Some((*id, *entry)),
+            Claim::Dependence(_) => None,
+        }
+    }
 }
 
 /// What was decided.
@@ -99,10 +135,10 @@ fn evidence(data: &Data, model: &Model) -> Vec<Evidence> {
 /// Parameters at which a finalist starts.
 fn start_of(data: &Data, candidate: &Candidate, score: &Score) -> Vec<f64> {
     let mut p = candidate.start.clone();
-    let bounds = data
-        .catalogue
-        .get(candidate.entry)
-        .parameters(&data.context);
+    let Some(entry) = candidate.entry else {
+        return p;
+    };
+    let bounds = data.catalogue.get(entry).parameters(&data.context);
     if candidate.free.is_empty() {
         if p.len() == 1 && score.coefficients[0] > 0.0 {
             p[0] *= score.coefficients[0].clamp(0.3, 3.0);
@@ -119,11 +155,12 @@ fn start_of(data: &Data, candidate: &Candidate, score: &Score) -> Vec<f64> {
 }
 
 /// Best candidates of a screen: at most `count` ids, at most two forms of each.
-fn best<'a>(table: &'a Table, all: &[Score], count: usize) -> Vec<(&'a Candidate, Score)> {
-    let mut out: Vec<(&Candidate, Score)> = Vec::new();
+fn best(table: &Table, all: &[Score], count: usize) -> Vec<(usize, Score)> {
+    let mut out: Vec<(usize, Score)> = Vec::new();
     let mut ids: Vec<Id> = Vec::new();
     for score in all {
         let candidate = &table.candidates[score.candidate];
+        let Some(id) = candidate.id else { continue };
         // An effect that would have to be turned round is not that effect.
         if candidate.free.is_empty() && !(score.coefficients[0] > 0.0) {
             continue;
@@ -132,18 +169,24 @@ fn best<'a>(table: &'a Table, all: &[Score], count: usize) -> Vec<(&'a Candidate
         if !(score.gain > price) {
             continue;
         }
-        if out.iter().filter(|(c, _)| c.id == candidate.id).count() >= 2
-            || out.iter().any(|(c, _)| c.entry == candidate.entry)
+        if out
+            .iter()
+            .filter(|(c, _)| table.candidates[*c].id == candidate.id)
+            .count()
+            >= 2
+            || out
+                .iter()
+                .any(|(c, _)| table.candidates[*c].entry == candidate.entry)
         {
             continue;
         }
-        if !ids.contains(&candidate.id) {
+        if !ids.contains(&id) {
             if ids.len() == count {
                 continue;
             }
-            ids.push(candidate.id);
+            ids.push(id);
         }
-        out.push((candidate, score.clone()));
+        out.push((score.candidate, score.clone()));
     }
     out
 }
@@ -155,29 +198,31 @@ fn effort(data: &Data) -> Effort {
         steps: 4,
         sweeps: 2,
         stride: (samples / 9000).max(1),
+        noise_stride: 3,
     }
 }
 
 /// One round: every finalist beside the model so far.
-fn round(data: &Data, so_far: &Judged, excluded: &[Id]) -> Vec<Trial> {
+fn round(data: &Data, so_far: &Judged, excluded: &[Id], chain_s: f64) -> Vec<Trial> {
     let effort = effort(data);
     let slopes = Slopes::new(data, &so_far.model.base);
+    let free = dependence::all(data, &so_far.model);
+    let taken = |id: Id| {
+        let entry = |t: &Term| data.catalogue.get(t.entry).id() == id;
+        excluded.contains(&id) || so_far.model.terms.iter().any(entry)
+    };
+    let found = evidence(data, &so_far.model);
     let table = table(
         data,
         &so_far.model,
         &slopes,
-        &evidence(data, &so_far.model),
-        true,
-        &|id| {
-            !excluded.contains(&id)
-                && !so_far
-                    .model
-                    .terms
-                    .iter()
-                    .any(|t| data.catalogue.get(t.entry).id() == id)
-        },
+        &found,
+        &so_far.extra,
+        &free,
+        &|id| !taken(id),
     );
-    let mut finalists: Vec<(&Candidate, Vec<f64>)> = Vec::new();
+    let mechanisms = table.candidates.len() - free.len();
+    let mut finalists: Vec<(usize, Vec<f64>)> = Vec::new();
     for (parts, count) in [
         (capped(&so_far.parts), FINALISTS[0]),
         (so_far.parts.clone(), FINALISTS[1]),
@@ -186,55 +231,160 @@ fn round(data: &Data, so_far: &Judged, excluded: &[Id]) -> Vec<Trial> {
         let Some((_, _, all)) = scores(&table, &sum) else {
             continue;
         };
-        for (candidate, score) in best(&table, &all, count) {
-            if !finalists.iter().any(|(c, _)| c.entry == candidate.entry) {
-                finalists.push((candidate, start_of(data, candidate, &score)));
+        for (index, score) in best(&table, &all, count) {
+            let candidate = &table.candidates[index];
+            if !finalists
+                .iter()
+                .any(|(c, _)| table.candidates[*c].entry == candidate.entry)
+            {
+                finalists.push((index, start_of(data, candidate, &score)));
             }
+        }
+        // The best free dependence of either screen.
+        let free = all.iter().find(|s| s.candidate >= mechanisms);
+        if let Some(score) = free
+            && !finalists.iter().any(|(c, _)| *c == score.candidate)
+        {
+            finalists.push((score.candidate, Vec::new()));
         }
     }
     let mut trials: Vec<Trial> = finalists
         .par_iter()
-        .filter_map(|(candidate, start)| {
+        .filter_map(|(index, start)| {
+            let candidate = &table.candidates[*index];
             let mut model = so_far.model.clone();
-            model.terms.push(Term {
-                entry: candidate.entry,
-                parameters: start.clone(),
-            });
-            let judged = judge(data, &model, Some(&capped(&so_far.parts)), effort)?;
-            Some(tried(data, so_far, candidate.entry, judged))
+            let mut extra = so_far.extra.clone();
+            let claim = match (candidate.id, candidate.entry) {
+                (Some(id), Some(entry)) => {
+                    model.terms.push(Term {
+                        entry,
+                        parameters: start.clone(),
+                    });
+                    Claim::Mechanism(id, entry)
+                }
+                _ => {
+                    let free = free[index - mechanisms].clone();
+                    extra.push(free.clone());
+                    Claim::Dependence(free)
+                }
+            };
+            let judged = judge(data, &model, &extra, Some(&so_far.parts), effort)?;
+            Some(tried(data, so_far, claim, judged, chain_s))
         })
         .collect();
     trials.sort_by(|a, b| b.gain.total_cmp(&a.gain));
     trials
 }
 
-fn tried(data: &Data, base: &Judged, entry: usize, judged: Judged) -> Trial {
-    let mechanism = data.catalogue.get(entry);
+fn tried(data: &Data, base: &Judged, claim: Claim, judged: Judged, chain_s: f64) -> Trial {
     let free = judged.free as f64 - base.free as f64;
-    let per_run = !mechanism.predicts() || mechanism.form().contains("per_run");
+    // What belongs to a run cannot be carried to another: its first half tells its second.
+    let per_run = match &claim {
+        Claim::Mechanism(_, entry) => data.catalogue.get(*entry).form().contains("per_run"),
+        Claim::Dependence(_) => false,
+    };
+    let readings = judged
+        .grams
+        .iter()
+        .flatten()
+        .map(|g| g.count)
+        .sum::<usize>();
+    let lowered = match &claim {
+        Claim::Mechanism(id, _) if through_force(*id) => {
+            Some(1.0 - residual(data, &judged.model) / residual(data, &base.model).max(1e-300))
+        }
+        _ => None,
+    };
+    let outlasts_chain = match &claim {
+        Claim::Mechanism(id, entry) => memory_s(data, *id, *entry, &judged.model)
+            .is_none_or(|memory| memory > LEAST_MEMORY_S.max(chain_s)),
+        Claim::Dependence(_) => true,
+    };
     Trial {
-        id: mechanism.id(),
-        entry,
+        claim,
         gain: base.loss - judged.loss - PRICE_OF_PARAMETER * free - PRICE_OF_NAME,
         unseen: unseen_gain(base, &judged, per_run),
+        lowered,
+        outlasts_chain,
+        readings: readings / judged.parts.len().max(1),
         judged,
     }
+}
+
+/// Whether a mechanism works through the force that is predicted.
+#[must_use]
+pub fn through_force(id: Id) -> bool {
+    let timing = matches!(
+        id,
+        Id::EffectiveRadius | Id::EncoderRipple | Id::WheelSpeedDelay | Id::VehicleSpeedDelay
+    );
+    id.balance() == Balance::Tyre && !timing
+}
+
+/// Memory of a mechanism in s, where it has one.
+fn memory_s(data: &Data, id: Id, entry: usize, model: &Model) -> Option<f64> {
+    let term = model.terms.iter().find(|t| t.entry == entry)?;
+    let first = *term.parameters.first()?;
+    match id {
+        Id::BrakeLag | Id::ForceLag | Id::ForceDelay => Some(first),
+        Id::RelaxationLength => Some(first / data.context.mean_speed),
+        _ => None,
+    }
+}
+
+/// Root mean square of the drag's residual in N.
+fn residual(data: &Data, model: &Model) -> f64 {
+    let (mut square, mut count) = (0.0, 0.0);
+    for s in &data.series {
+        let r = rows::<f64>(&data.catalogue, model, &model.vector(), s, &data.context);
+        if r.tyre.is_empty() {
+            continue;
+        }
+        for k in s.tyre.iter().flat_map(Clone::clone) {
+            if r.tyre[k].is_finite() {
+                square += r.tyre[k] * r.tyre[k];
+                count += 1.0;
+            }
+        }
+    }
+    (square / f64::max(count, 1.0)).sqrt()
 }
 
 /// Whether a trial stands.
 #[must_use]
 pub fn stands(trial: &Trial) -> bool {
-    trial.gain > LEAST_GAIN && trial.unseen.0 > 0.0 && trial.unseen.1 > LEAST_T
+    let worth = 0.5 * LEAST_EFFECT * LEAST_EFFECT * trial.readings as f64;
+    trial.gain > LEAST_GAIN.max(worth)
+        && trial.unseen.0 > 0.0
+        && trial.unseen.1 > LEAST_T
+        && trial.lowered.is_none_or(|share| share > LEAST_LOWERED)
+        && trial.outlasts_chain
 }
 
-/// Decides what is named beside the base model.
+/// The trial that is taken up: a mechanism, unless a free dependence accounts for much more.
+fn taken_up(trials: &[Trial]) -> Option<&Trial> {
+    let mut standing = trials.iter().filter(|t| stands(t));
+    let named = standing.clone().find(|t| t.mechanism().is_some());
+    let free = standing.find(|t| t.mechanism().is_none());
+    match (named, free) {
+        (Some(named), Some(free))
+            if free.gain > DEPENDENCE_SHARE * named.gain + DEPENDENCE_NATS =>
+        {
+            Some(free)
+        }
+        (Some(named), _) => Some(named),
+        (None, free) => free,
+    }
+}
+
+/// Decides what is named beside the base model; `chain_s` is what the chain's own timing was off by, in s.
 #[must_use]
-pub fn decide(data: &Data, base: Judged, excluded: &[Id]) -> Decision {
+pub fn decide(data: &Data, base: Judged, excluded: &[Id], chain_s: f64) -> Decision {
     let mut chosen = base.clone();
     let mut rounds = Vec::new();
-    while chosen.model.terms.len() < MOST_NAMES {
-        let trials = round(data, &chosen, excluded);
-        let next = trials.iter().find(|t| stands(t)).map(|t| t.judged.clone());
+    while chosen.model.terms.len() + chosen.extra.len() < MOST_NAMES {
+        let trials = round(data, &chosen, excluded, chain_s);
+        let next = taken_up(&trials).map(|t| t.judged.clone());
         rounds.push(trials);
         match next {
             Some(judged) => chosen = judged,
@@ -242,7 +392,7 @@ pub fn decide(data: &Data, base: Judged, excluded: &[Id]) -> Decision {
         }
     }
     if chosen.model.terms.len() > 1 {
-        chosen = without_idle(data, chosen);
+        chosen = without_idle(data, chosen, chain_s);
     }
     Decision {
         base,
@@ -252,14 +402,21 @@ pub fn decide(data: &Data, base: Judged, excluded: &[Id]) -> Decision {
 }
 
 /// Takes names out that the others do not need.
-fn without_idle(data: &Data, mut chosen: Judged) -> Judged {
+fn without_idle(data: &Data, mut chosen: Judged, chain_s: f64) -> Judged {
     let mut at = 0;
     while chosen.model.terms.len() > 1 && at < chosen.model.terms.len() {
         let mut model = chosen.model.clone();
         let term = model.terms.remove(at);
-        match judge(data, &model, Some(&chosen.parts), effort(data)) {
-            Some(without) if !stands(&tried(data, &without, term.entry, chosen.clone())) => {
-                chosen = without
+        let claim = Claim::Mechanism(data.catalogue.get(term.entry).id(), term.entry);
+        match judge(
+            data,
+            &model,
+            &chosen.extra,
+            Some(&chosen.parts),
+            effort(data),
+        ) {
+            Some(without) if !stands(&tried(data, &without, claim, chosen.clone(), chain_s)) => {
+                chosen = without;
             }
             _ => at += 1,
         }

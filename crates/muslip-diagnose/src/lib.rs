@@ -29,6 +29,7 @@
 )]
 
 pub mod ablation;
+pub mod answer;
 pub mod audit;
 pub mod campaign;
 pub mod chain;

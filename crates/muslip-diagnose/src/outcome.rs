@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
+pub use crate::audit::finding::{Finding as ChainFinding, Word as ChainWord};
 use crate::repaired::Repaired;
 
 /// The one word of the verdict.
@@ -230,59 +231,6 @@ pub struct Fault {
     pub end_s: f64,
     /// What is wrong.
     pub what: String,
-}
-
-/// What a measuring chain does, by the contract's words.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum ChainWord {
-    /// Reports late: s, positive is later.
-    Late,
-    /// Passes a low-pass filter: sum of time constants in s.
-    LowPassed,
-    /// Noise that is correlated in time: standard deviation in the channel's unit.
-    ColouredNoise,
-    /// Noise that it shares with another channel: standard deviation in the channel's unit.
-    CommonNoise,
-    /// Comes in steps: their size in the channel's unit.
-    Quantised,
-    /// Stays until the next value: s.
-    Held,
-    /// A wrong scale: factor.
-    Scale,
-    /// A wrong zero: the channel's unit.
-    Zero,
-    /// A zero that moves: the channel's unit a second.
-    Drifts,
-    /// A line of the mains: amplitude in the channel's unit.
-    Hum,
-    /// Varies with the wheel's angle: share.
-    Ripple,
-    /// A clock of its own: relative rate.
-    Clock,
-    /// Reproduces the drag without the tyre: correlation.
-    Leaks,
-}
-
-/// A finding about the measuring chain: not part of the verdict.
-#[derive(Clone, Debug, Serialize)]
-pub struct ChainFinding {
-    /// Path of the recording, or `*` for all.
-    pub recording: String,
-    /// Column.
-    pub channel: String,
-    /// Column that it is relative to; empty where that is the analogue channels, or nothing.
-    pub relative_to: String,
-    /// What it does.
-    pub finding: ChainWord,
-    /// How much, by the word's definition.
-    pub value: f64,
-    /// Standard deviation of that.
-    pub std: f64,
-    /// Unit in ASCII.
-    pub unit: String,
-    /// One sentence for an engineer.
-    pub statement: String,
 }
 
 /// One run for a plot: what was measured and what the two models say, thinned to a readable number of points.

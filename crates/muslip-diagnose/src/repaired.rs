@@ -6,6 +6,7 @@ use std::sync::Arc;
 use serde::{Deserialize, Serialize};
 
 use crate::campaign::{Rig, Run};
+use crate::chain::correct::Lateness;
 use crate::data::{Catalogue, Data};
 use crate::mechanism::{Context, Parameter};
 use crate::model::{Model, Term, tyre};
@@ -120,6 +121,9 @@ pub struct Repaired {
     pub proof_by_blocks: bool,
     /// Rig as declared.
     pub rig: Rig,
+    /// How late the channels are against the drag: taken off before the repaired model runs.
+    #[serde(default)]
+    pub late: Lateness,
     /// Base law alone, refitted: logarithms of peak friction and slip at the peak, and the input shares.
     pub base_alone: Vec<f64>,
     /// The same five in the repaired tyre model.
@@ -341,7 +345,10 @@ impl Repaired {
     /// # Errors
     /// [`RepairedError`] where the model cannot be run.
     pub fn predict(&self, run: &Run, which: Which) -> Result<Prediction, RepairedError> {
-        let mut blind = run.clone();
+        let mut blind = match which {
+            Which::Base => run.clone(),
+            Which::Repaired => self.late.corrected(run),
+        };
         blind.drag_force_n = Vec::new();
         let data = self.prepared(&blind);
         let model = self.tyre_model(&data.catalogue, which)?;

@@ -4,7 +4,6 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use muslip::filter::mu_slip::Range;
-use muslip_diagnose::ablation::Ablation;
 use muslip_diagnose::outcome::Diagnosis;
 
 use super::Failure;
@@ -13,6 +12,7 @@ use super::estimate::{Job, tell};
 use super::terminal::Terminal;
 use crate::demo;
 use crate::diagnose::job;
+use crate::diagnose::job::Judge;
 use crate::diagnose::summary::{WIDEST_LINE, summary};
 use crate::estimate::{EstimateOptions, EstimatorKind};
 use crate::output::{create_folder, write_file};
@@ -89,7 +89,7 @@ fn find_concealed(folder: &Path, terminal: &mut Terminal) -> Result<(), Failure>
         write_file(&path, contents)?;
         recordings.push(path);
     }
-    let (diagnosis, views) = diagnosed(&rig, &recordings, &found, Ablation::default())?;
+    let (diagnosis, views) = diagnosed(&rig, &recordings, &found, Judge::default())?;
     let shown: Vec<String> = recordings
         .iter()
         .map(|path| path.display().to_string())

@@ -10,7 +10,7 @@ use muslip_diagnose::outcome::Diagnosis;
 use super::Failure;
 use super::progress::Progress;
 use super::terminal::Terminal;
-use crate::diagnose::job::{self, WriteError};
+use crate::diagnose::job::{self, Engine, Judge, WriteError};
 use crate::diagnose::summary::{WIDEST_LINE, summary};
 use crate::diagnose::views::Views;
 use crate::diagnose::{load, page};
@@ -43,6 +43,9 @@ pub(super) struct Arguments {
     /// prefilter; may be repeated. For the trials of the documentation.
     #[arg(long = "ablate", value_name = "PART", value_parser = part, hide = true)]
     ablate: Vec<Part>,
+    /// Which engine judges: the one by innovations is being proven beside the one by residuals.
+    #[arg(long, value_enum, default_value_t, hide = true)]
+    engine: Engine,
     /// The recordings (CSV), one file a run.
     #[arg(value_name = "RUN.csv", required = true)]
     recordings: Vec<PathBuf>,
@@ -61,7 +64,11 @@ pub(super) fn run(arguments: &Arguments, terminal: &mut Terminal) -> Result<(), 
         })
         .unwrap_or_default();
     let out = &arguments.out;
-    let (diagnosis, views) = diagnosed(&arguments.rig, &arguments.recordings, out, ablation)?;
+    let judge = Judge {
+        engine: arguments.engine,
+        ablation,
+    };
+    let (diagnosis, views) = diagnosed(&arguments.rig, &arguments.recordings, out, judge)?;
     let text = job::write(out, &diagnosis, &views, &command(arguments))?;
     if let Some(format) = arguments.format {
         let report = page::report(&diagnosis, &views, "");
@@ -88,7 +95,7 @@ pub(super) fn diagnosed(
     rig: &Path,
     recordings: &[PathBuf],
     out: &Path,
-    ablation: Ablation,
+    judge: Judge,
 ) -> Result<(Diagnosis, Views), Failure> {
     let bar = Mutex::new(Progress::new("read", STEPS as u64));
     let tell = |what: &str, steps: f64| {
@@ -100,7 +107,7 @@ pub(super) fn diagnosed(
         tell("read", READING * share);
     })?;
     job::prepare_folder(out)?;
-    Ok(job::run(campaign, ablation, &|share, what| {
+    Ok(job::run(campaign, judge, &|share, what| {
         tell(what, READING + (STEPS - READING) * share);
     }))
 }

@@ -274,6 +274,7 @@ pub fn pictures() -> Result<Vec<(Id, Figure)>, GuideError> {
     let mut run = run_of(&scenario, &rows);
     let engine_rig = load::rig(&scenario.rig);
     let plain = Repaired {
+        late: muslip_diagnose::chain::correct::Lateness::default(),
         schema: "muslip.model/1".into(),
         averaged: 1,
         proof_by_blocks: false,

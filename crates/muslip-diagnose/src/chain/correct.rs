@@ -95,9 +95,9 @@ mod tests {
             ..Lateness::default()
         };
         let corrected = late.corrected(&run);
-        for k in 10..180 {
-            assert!((corrected.wheel_speed_rad_s[k] - 50.0 - 3.0 * time[k]).abs() < 1e-9);
-            assert!((corrected.vehicle_speed_m_s[k] - 20.0 + 2.0 * time[k]).abs() < 1e-9);
+        for (k, t) in time.iter().enumerate().take(180).skip(10) {
+            assert!((corrected.wheel_speed_rad_s[k] - 50.0 - 3.0 * t).abs() < 1e-9);
+            assert!((corrected.vehicle_speed_m_s[k] - 20.0 + 2.0 * t).abs() < 1e-9);
         }
     }
 }

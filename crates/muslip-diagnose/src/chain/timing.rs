@@ -2,6 +2,7 @@
 
 use super::correct::Lateness;
 use crate::ablation::Ablation;
+use crate::audit::Audit;
 use crate::campaign::{Rig, Run};
 use crate::data::Data;
 use crate::innovations::gram::solve;
@@ -15,6 +16,18 @@ pub struct Timing {
     pub late: Lateness,
     /// Wheel speed (at its mean), vehicle speed, brake: name, value and standard deviation in s.
     pub estimates: Vec<(&'static str, f64, f64)>,
+}
+
+impl Timing {
+    /// What the timing of wheel speed and brake was off by, in s: kernels differ by about as much as they delay.
+    #[must_use]
+    pub fn off_by(&self) -> f64 {
+        self.estimates
+            .iter()
+            .filter(|(name, _, std)| *name != "vehicle" && *std < 0.01)
+            .map(|(_, value, _)| value.abs())
+            .fold(0.0, f64::max)
+    }
 }
 
 /// Shortest step of time that is worth keeping, in s: what is faster cannot be told from the sensors.
@@ -53,10 +66,14 @@ pub fn averaging(runs: &[Run]) -> usize {
 
 /// Brings the channels to the drag channel's time and fits the base law to them.
 #[must_use]
-pub fn timed(rig: &Rig, runs: &[Run]) -> Option<(Data, Timing, Judged)> {
+pub fn timed(rig: &Rig, runs: &[Run], audit: &Audit) -> Option<(Data, Timing, Judged)> {
     let averaged = averaging(runs);
     let runs: Vec<Run> = runs.iter().map(|r| r.clone().averaged(averaged)).collect();
     let mut timing = Timing::default();
+    let known = |t: &crate::audit::Timing| if t.std.is_finite() { t.value } else { 0.0 };
+    timing.late.wheel = known(&audit.wheel_late);
+    timing.late.vehicle = known(&audit.vehicle_late);
+    timing.late.brake = known(&audit.brake_late);
     let mut model = Model {
         base: vec![0.0; TYRE_BASE],
         terms: Vec::new(),
@@ -75,8 +92,9 @@ pub fn timed(rig: &Rig, runs: &[Run]) -> Option<(Data, Timing, Judged)> {
             steps: if pass == 0 { 5 } else { 2 },
             sweeps: if pass == 0 || last { 3 } else { 1 },
             stride: (samples / 9000).max(1),
+            noise_stride: 2,
         };
-        let judged = judge(&data, &model, guess.as_deref(), effort)?;
+        let judged = judge(&data, &model, &[], guess.as_deref(), effort)?;
         let (shift, std) = shifts(&judged)?;
         timing.estimates = vec![
             (

@@ -9,6 +9,7 @@ mod scores;
 use nalgebra::DMatrix;
 
 use crate::ablation::Ablation;
+use crate::audit::{Finding, audit};
 use crate::campaign::{Rig, Run};
 use crate::choose::Limits;
 use crate::confidence::covariance;
@@ -49,6 +50,8 @@ pub fn diagnose_without(
     let averaged = total.div_ceil(MOST_SAMPLES).max(1);
     // One after the other, so that the long recordings do not outlive their means.
     let runs: Vec<Run> = runs.into_iter().map(|run| run.averaged(averaged)).collect();
+    // The measuring chain first: what it does is told beside any physics.
+    let chain_findings = audit(rig, &runs).findings;
     let mut data = Data::new(rig, &runs, ablation);
     data.averaged = averaged;
     let split = Split::new(&data);
@@ -70,6 +73,7 @@ pub fn diagnose_without(
         tyre: tyre.as_ref(),
         dynamics: dynamics.as_ref(),
         chain: chain.as_deref(),
+        chain_findings,
     }
     .assemble();
     progress(1.0, "done");
@@ -83,6 +87,7 @@ struct Outcome<'a> {
     tyre: Option<&'a TyreStage>,
     dynamics: Option<&'a DynamicsStage>,
     chain: Option<&'a [Vec<f64>]>,
+    chain_findings: Vec<Finding>,
 }
 
 impl Outcome<'_> {
@@ -197,7 +202,7 @@ impl Outcome<'_> {
             looked_for: looked,
             data_faults: self.faults(),
             // The audit of the chain is yet to fill it.
-            chain: Vec::new(),
+            chain: self.chain_findings.clone(),
             fit: self.scores(),
             caveats: self.caveats(),
             traces: self.traces(),

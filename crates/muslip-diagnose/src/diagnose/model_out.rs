@@ -92,6 +92,7 @@ impl Outcome<'_> {
             averaged: data.averaged,
             proof_by_blocks: self.split.by_block,
             rig: data.rig.clone(),
+            late: crate::chain::correct::Lateness::default(),
             base_alone,
             base,
             tyre,

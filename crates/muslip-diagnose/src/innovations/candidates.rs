@@ -2,6 +2,7 @@
 
 use rayon::prelude::*;
 
+use super::dependence::Dependence;
 use super::gram::Columns;
 use super::noise::Slopes;
 use super::rows::{Rows, rows};
@@ -13,13 +14,13 @@ use crate::number::{Dual, Number};
 /// Rows of one run by balance, in the order tyre, wheel, vehicle.
 pub type Triple = [Vec<f64>; 3];
 
-/// A mechanism at one place of its nonlinear parameters.
+/// A mechanism at one place of its nonlinear parameters, or a free dependence.
 #[derive(Clone, Debug)]
 pub struct Candidate {
-    /// Entry of the catalogue.
-    pub entry: usize,
-    /// Its id.
-    pub id: Id,
+    /// Entry of the catalogue; `None` for a free dependence.
+    pub entry: Option<usize>,
+    /// Its id; `None` for a free dependence.
+    pub id: Option<Id>,
     /// Parameters at which the columns were taken.
     pub start: Vec<f64>,
     /// Parameters that the columns belong to; empty where the one column is the whole effect at the start.
@@ -27,6 +28,11 @@ pub struct Candidate {
     /// First of its columns, counted from the first candidate's, and their number.
     pub columns: core::ops::Range<usize>,
 }
+
+/// Columns of one run that every model has: residual, base and terms; nuisances.
+type Fixed = (Vec<Triple>, Vec<(Nuisance, Triple)>);
+/// A mechanism's own columns: the parameters that they belong to, and the columns by run.
+type Own = (Vec<usize>, Vec<Vec<Triple>>);
 
 /// A nuisance of the measuring chain: columns that every model has, with a prior.
 pub struct Nuisance {
@@ -117,7 +123,7 @@ fn second(rate: &[f64], time: &[f64]) -> Vec<f64> {
 }
 
 /// Columns of the measuring chain's nuisances on one run, with their names and prior sizes.
-fn nuisances(data: &Data, slopes: &Slopes, run: usize, known: bool) -> Vec<(Nuisance, Triple)> {
+fn nuisances(data: &Data, slopes: &Slopes, run: usize) -> Vec<(Nuisance, Triple)> {
     let s = &data.series[run];
     let n = s.len();
     let (inertia, mass) = (data.context.inertia, data.context.mass);
@@ -164,6 +170,23 @@ fn nuisances(data: &Data, slopes: &Slopes, run: usize, known: bool) -> Vec<(Nuis
             column(Balance::Vehicle, &|_| 0.0),
         ]
     };
+    // A mean over noisy slip is not the law at the mean slip: half its second derivative times the noise's variance.
+    let by_curvature = || -> Triple {
+        let radius = data.context.radius;
+        let curve = |k: usize| {
+            if !s.rolling[k] {
+                return 0.0;
+            }
+            let noise = (radius / s.speed.smooth[k] * s.wheel.sigma).powi(2)
+                + (radius * s.wheel.smooth[k] / s.speed.smooth[k].powi(2) * s.speed.sigma).powi(2);
+            -0.5 * slopes.curvature[run][k] * noise
+        };
+        [
+            column(Balance::Tyre, &curve),
+            column(Balance::Wheel, &|_| 0.0),
+            column(Balance::Vehicle, &|_| 0.0),
+        ]
+    };
     // The same of brake and drag where they are integrated.
     let by_integral = |reach: f64, brake: bool| -> Triple {
         let zero = vec![0.0; n];
@@ -199,7 +222,6 @@ fn nuisances(data: &Data, slopes: &Slopes, run: usize, known: bool) -> Vec<(Nuis
         ]
     };
     let torque = |k: usize| s.torque.as_ref().map_or(0.0, |t| t.smooth[k]);
-    let _ = known;
     let nuisance = |name, std| Nuisance { name, std };
     vec![
         (
@@ -238,6 +260,10 @@ fn nuisances(data: &Data, slopes: &Slopes, run: usize, known: bool) -> Vec<(Nuis
             by_integral(0.02, false),
         ),
         (
+            nuisance("law's curvature under slip noise", 1.0),
+            by_curvature(),
+        ),
+        (
             nuisance("vehicle speed low-passed", 3e-3),
             by_speed(&|k| -0.5 * speed_second[k]),
         ),
@@ -255,7 +281,8 @@ pub fn table(
     model: &Model,
     slopes: &Slopes,
     evidence: &[Evidence],
-    known: bool,
+    extra: &[Dependence],
+    free: &[Dependence],
     wanted: &dyn Fn(Id) -> bool,
 ) -> Table {
     let runs = data.series.len();
@@ -263,14 +290,18 @@ pub fn table(
     let own: Vec<usize> = (model.base.len()..model.vector().len()).collect();
     let mut fixed: Vec<usize> = base.clone();
     fixed.extend(&own);
-    let per_run: Vec<(Vec<Triple>, Vec<(Nuisance, Triple)>)> = (0..runs)
+    let per_run: Vec<Fixed> = (0..runs)
         .into_par_iter()
         .map(|run| {
             let mut all = vec![plain(data, model, run)];
             all.extend(slopes_in(data, model, run, &fixed));
-            (all, nuisances(data, slopes, run, known))
+            for dependence in extra {
+                all.extend(dependence.columns[run].iter().cloned());
+            }
+            (all, nuisances(data, slopes, run))
         })
         .collect();
+    let here: Vec<Triple> = per_run.iter().map(|(all, _)| all[0].clone()).collect();
     let mut columns: [Vec<Columns>; 3] = core::array::from_fn(|_| vec![Vec::new(); runs]);
     let mut listed = Vec::new();
     for (run, (fixed, nuisance)) in per_run.into_iter().enumerate() {
@@ -297,9 +328,9 @@ pub fn table(
                 .map(move |s| (entry, s))
         })
         .collect();
-    let made: Vec<Option<(Vec<usize>, Vec<Vec<Triple>>)>> = entries
+    let made: Vec<Option<Own>> = entries
         .par_iter()
-        .map(|(entry, start)| column_of(data, model, *entry, start))
+        .map(|(entry, start)| column_of(data, model, *entry, start, &here))
         .collect();
     let mut candidates = Vec::new();
     let mut at = 0;
@@ -316,17 +347,35 @@ pub fn table(
             }
         }
         candidates.push(Candidate {
-            entry,
-            id: data.catalogue.get(entry).id(),
+            entry: Some(entry),
+            id: Some(data.catalogue.get(entry).id()),
             start,
             free,
             columns: at..at + width,
         });
         at += width;
     }
+    for dependence in free {
+        let width = dependence.knots.len();
+        for (run, triples) in dependence.columns.iter().enumerate() {
+            for triple in triples {
+                for (b, column) in triple.iter().enumerate() {
+                    columns[b][run].push(column.clone());
+                }
+            }
+        }
+        candidates.push(Candidate {
+            entry: None,
+            id: None,
+            start: Vec::new(),
+            free: (0..width).collect(),
+            columns: at..at + width,
+        });
+        at += width;
+    }
     Table {
         columns,
-        base: fixed.len(),
+        base: fixed.len() + extra.iter().map(|e| e.knots.len()).sum::<usize>(),
         nuisances: listed,
         candidates,
     }
@@ -338,7 +387,8 @@ fn column_of(
     model: &Model,
     entry: usize,
     start: &[f64],
-) -> Option<(Vec<usize>, Vec<Vec<Triple>>)> {
+    here: &[Triple],
+) -> Option<Own> {
     let mut with = model.clone();
     with.terms.push(Term {
         entry,
@@ -347,7 +397,7 @@ fn column_of(
     let first = model.vector().len();
     let difference: Vec<Triple> = (0..data.series.len())
         .map(|run| {
-            let (a, b) = (plain(data, &with, run), plain(data, model, run));
+            let (a, b) = (plain(data, &with, run), &here[run]);
             core::array::from_fn(|i| a[i].iter().zip(&b[i]).map(|(a, b)| a - b).collect())
         })
         .collect();

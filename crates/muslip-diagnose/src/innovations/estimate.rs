@@ -79,7 +79,7 @@ pub fn fit(
             let (h, up, down) = (step[i], at(here + step[i]), at(here - step[i]));
             let curvature = up + down - 2.0 * best;
             let move_by = if curvature > 1e-9 {
-                (0.5 * h * (down - up) / curvature).clamp(-3.0 * h, 3.0 * h)
+                (0.5 * h * (down - up) / curvature).clamp(-5.0 * h, 5.0 * h)
             } else if up < down {
                 2.0 * h
             } else {

@@ -131,3 +131,36 @@ pub fn solve(
         log_det,
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn least_squares_on_products_is_least_squares_on_columns() {
+        // y = 3 a − 2 b + e: the residual of the model is −y, whose fit are the coefficients that cancel it.
+        let a = [1.0, 2.0, -1.0, 0.5, 3.0];
+        let b = [0.0, 1.0, 1.0, -2.0, 0.3];
+        let e = [0.01, -0.02, 0.005, 0.01, -0.01];
+        let columns = DMatrix::from_fn(3, 5, |i, k| match i {
+            0 => -(3.0 * a[k] - 2.0 * b[k] + e[k]),
+            1 => a[k],
+            _ => b[k],
+        });
+        let solved = solve(&(&columns * columns.transpose()), &[1, 2], &|_| 0.0).unwrap();
+        let x = DMatrix::from_fn(5, 2, |k, i| columns[(i + 1, k)]);
+        let y = -columns.row(0).transpose();
+        let expected = x.clone().svd(true, true).solve(&y, 1e-12).unwrap();
+        assert!((&solved.coefficients - &expected).norm() < 1e-7);
+        assert!((solved.rss - (y - x * expected).norm_squared()).abs() < 1e-6);
+    }
+
+    #[test]
+    fn a_tight_prior_keeps_a_coefficient_at_nothing() {
+        let products = DMatrix::from_row_slice(2, 2, &[4.0, -2.0, -2.0, 1.0]);
+        let free = solve(&products, &[1], &|_| 0.0).unwrap();
+        let tight = solve(&products, &[1], &|_| 1e6).unwrap();
+        assert!((free.coefficients[0] - 2.0).abs() < 1e-6);
+        assert!(tight.coefficients[0].abs() < 1e-5);
+    }
+}

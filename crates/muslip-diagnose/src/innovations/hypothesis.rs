@@ -4,6 +4,7 @@
 use nalgebra::DVector;
 
 use super::candidates::{Table, table};
+use super::dependence::Dependence;
 use super::estimate;
 use super::gram::{Gram, grams, solve};
 use super::noise::{BalanceParts, Slopes, parts};
@@ -16,6 +17,8 @@ use crate::model::{Model, TYRE_BASE};
 pub struct Judged {
     /// Base law and terms.
     pub model: Model,
+    /// Free dependences beside them.
+    pub extra: Vec<Dependence>,
     /// Noise under it.
     pub parts: Vec<BalanceParts>,
     /// Negative log likelihood at the best, the noise's prior included, in nats.
@@ -47,6 +50,8 @@ pub struct Effort {
     pub sweeps: usize,
     /// Every so many samples.
     pub stride: usize,
+    /// Of these every so many for the sizes of the noise.
+    pub noise_stride: usize,
 }
 
 fn bounds(data: &Data, model: &Model) -> Vec<(f64, f64)> {
@@ -136,6 +141,7 @@ fn with_sizes(mut fresh: Vec<BalanceParts>, old: &[BalanceParts]) -> Vec<Balance
 pub fn judge(
     data: &Data,
     start: &Model,
+    extra: &[Dependence],
     guess: Option<&[BalanceParts]>,
     effort: Effort,
 ) -> Option<Judged> {
@@ -157,20 +163,23 @@ pub fn judge(
             Some(old) => with_sizes(fresh, old),
             None => fresh,
         };
-        let table = table(data, &model, &slopes, &none, true, &|_| false);
+        let table = table(data, &model, &slopes, &none, extra, &[], &|_| false);
         let prior = |i: usize| precision(&table, i);
         let last = pass == effort.steps;
         let mut refitted = false;
-        if last || pass == effort.steps / 2 {
+        if last || (guess.is_none() && pass == effort.steps / 2) {
             for part in &mut noise {
-                estimate::fit(
-                    data,
-                    part,
-                    &table.columns[part.balance as usize],
-                    &prior,
-                    effort.stride,
-                    effort.sweeps,
-                );
+                let columns = &table.columns[part.balance as usize];
+                let stride = effort.stride * effort.noise_stride;
+                let fit = |part: &mut BalanceParts| {
+                    estimate::fit(data, part, columns, &prior, stride, effort.sweeps)
+                };
+                // What swallowed an effect before it was in the model must be let go of: from below, too.
+                let mut small = capped(core::slice::from_ref(part)).remove(0);
+                let from_above = fit(part);
+                if guess.is_some() && fit(&mut small) < from_above {
+                    *part = small;
+                }
             }
             refitted = true;
         }
@@ -189,7 +198,9 @@ pub fn judge(
             let k = own.len();
             return Some(Judged {
                 loss: 0.5 * (sum.log_variance + solved.rss) + penalty,
-                free: start.vector().len() - start.base.len(),
+                free: start.vector().len() - start.base.len()
+                    + extra.iter().map(|e| e.knots.len()).sum::<usize>(),
+                extra: extra.to_vec(),
                 covariance: solved.covariance.view((0, 0), (k, k)).into_owned(),
                 nuisances: table.nuisances.len(),
                 prior: (0..sum.products.nrows()).map(prior).collect(),

@@ -1,6 +1,7 @@
 //! Residuals of the three balances, their covariance, and the innovations under it.
 
 pub mod candidates;
+pub mod dependence;
 pub mod estimate;
 pub mod gram;
 pub mod hypothesis;

@@ -40,6 +40,8 @@ pub struct Slopes {
     pub force: Vec<Vec<f64>>,
     /// N per 1 of slip.
     pub slip: Vec<Vec<f64>>,
+    /// Second derivative, in N per 1 of slip squared.
+    pub curvature: Vec<Vec<f64>>,
 }
 
 impl Slopes {
@@ -53,9 +55,10 @@ impl Slopes {
             speed: Vec::new(),
             force: Vec::new(),
             slip: Vec::new(),
+            curvature: Vec::new(),
         };
         for s in &data.series {
-            let mut all = [const { Vec::new() }; 4];
+            let mut all = [const { Vec::new() }; 5];
             for k in 0..s.len() {
                 let (v, omega, load) = (s.speed.smooth[k], s.wheel.smooth[k], s.load.smooth[k]);
                 let x = s.slip(k, radius) / critical;
@@ -73,12 +76,17 @@ impl Slopes {
                 all[1].push(finite(slope * radius * omega / (v * v)));
                 all[2].push(finite(force));
                 all[3].push(finite(slope));
+                // Of x/(1 + x²): 2x (x² − 3)/(1 + x²)³.
+                let bend = load * 2.0 * peak / (critical * critical) * 2.0 * x * (x * x - 3.0)
+                    / shape.powi(3);
+                all[4].push(if s.rolling[k] { finite(bend) } else { 0.0 });
             }
-            let [wheel, speed, force, slip] = all;
+            let [wheel, speed, force, slip, curvature] = all;
             out.wheel.push(wheel);
             out.speed.push(speed);
             out.force.push(force);
             out.slip.push(slip);
+            out.curvature.push(curvature);
         }
         out
     }

@@ -89,7 +89,7 @@ impl Describe for RollingResistance {
 impl<T: Number> Mechanism<T> for RollingResistance {
     fn apply(&self, p: &[T], series: &Series, context: &Context, state: &mut State<T>) {
         let mut moment = vec![T::constant(0.0); state.force.len()];
-        for k in 0..state.force.len() {
+        for (k, moment) in moment.iter_mut().enumerate() {
             // Gone at standstill and when the wheel no longer rolls.
             let surface = series.wheel.smooth[k] * context.radius;
             if !series.rolling[k] || !(surface > 0.0) {
@@ -101,7 +101,7 @@ impl<T: Number> Mechanism<T> for RollingResistance {
                 coefficient = coefficient * (p[1] * (relative * relative - 1.0) + 1.0);
             }
             state.force[k] += coefficient * state.load[k];
-            moment[k] = coefficient * state.load[k] * context.radius;
+            *moment = coefficient * state.load[k] * context.radius;
         }
         if self.growing {
             state.rolling_moment = Some(moment);
