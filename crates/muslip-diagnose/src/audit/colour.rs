@@ -1,7 +1,11 @@
 //! Noise with a memory, read off what a balance leaves.
 
-use super::constants::{COLOURED_SHARE, LONGEST_COLOUR_S};
+use super::constants::{COLOURED_SHARE, LASTING_SHARE, LONGEST_COLOUR_S, OWN_LAG_S};
 use super::finding::{Finding, Word};
+use super::recording::Recording;
+use super::structure::{Memory, Pair, structure};
+use super::tyre::Stretch;
+use crate::smooth::median_in_place;
 
 /// Standard deviation and time constant of the part of residuals that lasts longer than two steps, where it is most of them.
 #[must_use]
@@ -41,6 +45,88 @@ pub fn of_vehicle(residual: &[Vec<f64>], step: f64, white: f64) -> Option<Findin
             "The noise of the vehicle speed has a slow part of {std:.4} m/s with a time constant of {time:.2} s."
         ))
     })
+}
+
+/// Shortest lag of a channel's own memory, in steps of the grid: means over steps share readings with their neighbours.
+const SHORTEST_LAG: usize = 2;
+/// Step of the grid on which a held vehicle's speed is looked at, s.
+const SPEED_STEP_S: f64 = 0.01;
+/// Share of a run's blocks that are its calm ones.
+const CALM_SHARE: f64 = 0.4;
+
+fn sentence(channel: &str, of: &str, unit: &str, memory: &Memory) -> Finding {
+    let (size, std) = memory.size();
+    Finding::of(
+        channel,
+        Word::ColouredNoise,
+        (size, std.max(0.03 * size)),
+        unit,
+    )
+    .saying(format!(
+        "The noise of the {of} has a slow part of {size:.4} {unit} with a time constant of {:.2} s.",
+        memory.time
+    ))
+}
+
+fn lasting(memory: Memory) -> Option<Memory> {
+    (memory.is_sure()
+        && memory.variance.sqrt() > LASTING_SHARE * memory.white.max(0.0).sqrt()
+        && memory.time < LONGEST_COLOUR_S)
+        .then_some(memory)
+}
+
+/// Slow noise of a vehicle speed that a rig holds: whatever of it does not run straight.
+#[must_use]
+pub fn of_held(runs: &[Recording]) -> Option<Finding> {
+    let mut steps: Vec<f64> = runs.iter().map(|run| run.step).collect();
+    let step = SPEED_STEP_S.max(median_in_place(&mut steps));
+    let mut pairs = Vec::new();
+    for run in runs {
+        for moving in &run.moving {
+            let span = run.time[moving.end - 1] - run.time[moving.start];
+            let count = (span / step) as usize;
+            let speed = run
+                .speed
+                .signal
+                .means(run.time[moving.start] + 0.5 * step, step, count);
+            pairs.push(Pair {
+                b: speed.clone(),
+                factor: vec![1.0; count],
+                level: vec![0.0; count],
+                a: speed,
+            });
+        }
+    }
+    let memory = lasting(structure(&pairs, step, (SHORTEST_LAG, OWN_LAG_S)).memory(true)?)?;
+    Some(sentence(
+        "vehicle_speed_m_s",
+        "vehicle speed",
+        "m/s",
+        &memory,
+    ))
+}
+
+/// Slow noise of the drag: what it leaves beside the law and beside the wheel's balance alike; where no brake is known, what it
+/// leaves beside the law as much while there is little force as while there is much.
+#[must_use]
+pub fn of_drag(left: &[Stretch], step: f64) -> Option<Finding> {
+    let both = !left.is_empty() && left.iter().all(|s| !s.wheel.is_empty());
+    let pairs: Vec<Pair> = left
+        .iter()
+        .map(|s| Pair {
+            a: s.law.clone(),
+            b: if both { s.wheel.clone() } else { s.law.clone() },
+            factor: vec![1.0; s.law.len()],
+            level: s.drag.iter().map(|f| f.abs()).collect(),
+        })
+        .collect();
+    let all = structure(&pairs, step, (SHORTEST_LAG, OWN_LAG_S));
+    let memory = lasting(all.memory(true)?)?;
+    let calm = lasting(all.calmest(CALM_SHARE).memory(true)?)?;
+    // Physics grows with the force.
+    let differ = (memory.variance - calm.variance).abs();
+    (differ < 3.0 * memory.std.hypot(calm.std) && differ < 0.6 * memory.variance)
+        .then(|| sentence("drag_force_n", "drag", "N", &memory))
 }
 
 #[cfg(test)]
