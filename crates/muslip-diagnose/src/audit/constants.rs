@@ -104,3 +104,5 @@ pub const COMMON_SHARE: f64 = 0.7;
 pub const OWN_LAG_S: f64 = 0.8;
 /// A channel's lasting noise is told from this share of its white noise's standard deviation.
 pub const LASTING_SHARE: f64 = 0.7;
+/// Lag at which blocks are seen to move, s: noise has many such in a block.
+pub const MEMORY_MOTION_S: f64 = 0.02;

@@ -5,7 +5,7 @@
 //! Whatever runs straight has none.
 
 use super::constants::{
-    LONGEST_COLOUR_S, MEMORY_BLOCK_S, MEMORY_GROUPS, MEMORY_LAGS, MEMORY_SIGMAS, MEMORY_TIMES,
+    LONGEST_COLOUR_S, MEMORY_BLOCK_S, MEMORY_GROUPS, MEMORY_LAGS, MEMORY_MOTION_S, MEMORY_SIGMAS, MEMORY_TIMES,
 };
 use crate::smooth::median_in_place;
 
@@ -63,6 +63,7 @@ struct Sums {
     /// Of each lag: products, squares of the first series, of the second, number.
     lags: Vec<[f64; 4]>,
     level: f64,
+    series: usize,
 }
 
 /// Sums over all series on grids of a step in s, from a lag of so many steps to one in s.
@@ -78,13 +79,14 @@ pub fn structure(pairs: &[Pair], step: f64, (shortest, longest_s): (usize, f64))
     lags.dedup();
     let length = ((MEMORY_BLOCK_S / step) as usize).max(8);
     let mut blocks = Vec::new();
-    for pair in pairs {
+    for (series, pair) in pairs.iter().enumerate() {
         let n = pair.a.len();
         for start in (0..n).step_by(length) {
             let end = (start + length).min(n);
             let mut sums = Sums {
                 lags: vec![[0.0; 4]; lags.len()],
                 level: pair.level[start..end].iter().sum::<f64>() / (end - start) as f64,
+                series,
             };
             for (sum, &lag) in sums.lags.iter_mut().zip(&lags) {
                 for k in start.max(lag)..end.min(n.saturating_sub(lag)) {
@@ -123,39 +125,81 @@ impl Structure {
         }
     }
 
-    /// Mean products by lag and their weights, blocks in which much moves counting little; one group of blocks left out.
-    fn means(&self, without: Option<usize>) -> Vec<(f64, f64, f64)> {
-        let groups = self.blocks.len().div_ceil(MEMORY_GROUPS).max(1);
-        (0..self.lags.len())
-            .map(|i| {
-                let motion = |s: &[f64; 4]| (s[1] * s[2]).max(0.0).sqrt() / s[3];
-                let mut motions: Vec<f64> = self
-                    .blocks
-                    .iter()
-                    .map(|b| &b.lags[i])
-                    .filter(|s| s[3] > 0.0)
-                    .map(motion)
-                    .collect();
-                if motions.is_empty() {
-                    return (0.0, 0.0, f64::INFINITY);
+    /// How much moves in each block at a short lag, blocks as far around as a lag reaches taken together.
+    fn motions(&self, lag: usize) -> Vec<f64> {
+        let place = self
+            .lags
+            .iter()
+            .position(|l| *l as f64 * self.step >= MEMORY_MOTION_S)
+            .unwrap_or(0);
+        let own: Vec<[f64; 4]> = self.blocks.iter().map(|b| b.lags[place]).collect();
+        let reach = (lag as f64 * self.step / MEMORY_BLOCK_S).ceil() as usize;
+        (0..own.len())
+            .map(|k| {
+                let (from, to) = (k.saturating_sub(reach), (k + reach + 1).min(own.len()));
+                let (mut a, mut b, mut n) = (0.0, 0.0, 0.0);
+                for i in (from..to).filter(|&i| self.blocks[i].series == self.blocks[k].series) {
+                    a += own[i][1];
+                    b += own[i][2];
+                    n += own[i][3];
                 }
-                motions.sort_by(f64::total_cmp);
-                let usual = motions[motions.len() / 3];
-                let (mut top, mut size, mut bottom) = (0.0, 0.0, 0.0);
-                for (k, block) in self.blocks.iter().enumerate() {
-                    let sums = &block.lags[i];
-                    if sums[3] == 0.0 || without == Some(k / groups) {
-                        continue;
-                    }
-                    let weight = (usual + motion(sums)).powi(-2);
-                    top += weight * sums[0];
-                    size += weight * sums[3] * motion(sums);
-                    bottom += weight * sums[3];
-                }
-                let bottom = f64::max(bottom, 1e-300);
-                (self.lags[i] as f64 * self.step, top / bottom, size / bottom)
+                f64::max(a * b, 0.0).sqrt() / f64::max(n, 1.0)
             })
-            .filter(|(_, _, size)| size.is_finite())
+            .collect()
+    }
+
+    /// Products by lag with each block's weight: blocks in which much moves count little.
+    fn weighed(&self) -> Vec<Vec<[f64; 3]>> {
+        self.lags
+            .iter()
+            .enumerate()
+            .map(|(i, &lag)| {
+                let motions = self.motions(lag);
+                let usual = middle(
+                    motions
+                        .iter()
+                        .zip(&self.blocks)
+                        .filter(|(_, b)| b.lags[i][3] > 0.0)
+                        .map(|(m, _)| *m),
+                );
+                self.blocks
+                    .iter()
+                    .zip(&motions)
+                    .map(|(block, motion)| {
+                        let s = &block.lags[i];
+                        let weight = (usual + motion).powi(-2);
+                        if s[3] == 0.0 || !weight.is_finite() {
+                            return [0.0; 3];
+                        }
+                        [
+                            weight * s[0],
+                            weight * f64::max(s[1] * s[2], 0.0).sqrt(),
+                            weight * s[3],
+                        ]
+                    })
+                    .collect()
+            })
+            .collect()
+    }
+
+    /// Lag in s, mean product and mean size by lag, one group of blocks left out.
+    fn means(&self, weighed: &[Vec<[f64; 3]>], without: Option<usize>) -> Vec<(f64, f64, f64)> {
+        let group = self.blocks.len().div_ceil(MEMORY_GROUPS).max(1);
+        self.lags
+            .iter()
+            .zip(weighed)
+            .filter_map(|(&lag, blocks)| {
+                let mut sums = [0.0; 3];
+                for (k, block) in blocks.iter().enumerate() {
+                    if without != Some(k / group) {
+                        for (sum, x) in sums.iter_mut().zip(block) {
+                            *sum += x;
+                        }
+                    }
+                }
+                (sums[2] > 0.0)
+                    .then(|| (lag as f64 * self.step, sums[0] / sums[2], sums[1] / sums[2]))
+            })
             .collect()
     }
 
@@ -206,9 +250,10 @@ impl Structure {
         if self.blocks.len() < 2 * MEMORY_GROUPS {
             return None;
         }
-        let (variance, time, flat) = Self::fit(&self.means(None), white, self.step)?;
+        let weighed = self.weighed();
+        let (variance, time, flat) = Self::fit(&self.means(&weighed, None), white, self.step)?;
         let others: Vec<f64> = (0..MEMORY_GROUPS)
-            .filter_map(|g| Some(Self::fit(&self.means(Some(g)), white, self.step)?.0))
+            .filter_map(|g| Some(Self::fit(&self.means(&weighed, Some(g)), white, self.step)?.0))
             .collect();
         let count = others.len() as f64;
         let mean = others.iter().sum::<f64>() / count;
@@ -224,7 +269,7 @@ impl Structure {
     /// Mean product at the lag nearest to one in s.
     #[must_use]
     pub fn at(&self, lag_s: f64) -> f64 {
-        self.means(None)
+        self.means(&self.weighed(), None)
             .into_iter()
             .min_by(|a, b| (a.0 - lag_s).abs().total_cmp(&(b.0 - lag_s).abs()))
             .map_or(0.0, |m| m.1)
