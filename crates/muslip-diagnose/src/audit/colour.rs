@@ -3,7 +3,7 @@
 use super::constants::{COLOURED_SHARE, LASTING_SHARE, LONGEST_COLOUR_S, OWN_LAG_S};
 use super::finding::{Finding, Word};
 use super::recording::Recording;
-use super::structure::{Memory, Pair, structure};
+use super::structure::{Memory, Pair, Structure, structure};
 use super::tyre::Stretch;
 use crate::smooth::median_in_place;
 
@@ -53,6 +53,12 @@ const SHORTEST_LAG: usize = 2;
 const SPEED_STEP_S: f64 = 0.01;
 /// Share of a run's blocks that are its calm ones.
 const CALM_SHARE: f64 = 0.4;
+/// How far around a moment has to be calm, s.
+const CALM_S: f64 = 0.2;
+/// Time on either side over which the drag's change is taken, s.
+const CHANGE_S: f64 = 0.015;
+/// Least share of the noise that calm blocks must have; as much more they may have.
+const CALM_RATIO: f64 = 0.5;
 
 fn sentence(channel: &str, of: &str, unit: &str, memory: &Memory) -> Finding {
     let (size, std) = memory.size();
@@ -92,7 +98,7 @@ pub fn of_held(runs: &[Recording]) -> Option<Finding> {
             pairs.push(Pair {
                 b: speed.clone(),
                 factor: vec![1.0; count],
-                level: vec![0.0; count],
+                levels: Vec::new(),
                 a: speed,
             });
         }
@@ -111,22 +117,49 @@ pub fn of_held(runs: &[Recording]) -> Option<Finding> {
 #[must_use]
 pub fn of_drag(left: &[Stretch], step: f64) -> Option<Finding> {
     let both = !left.is_empty() && left.iter().all(|s| !s.wheel.is_empty());
+    let reach = (CALM_S / step) as usize;
     let pairs: Vec<Pair> = left
         .iter()
-        .map(|s| Pair {
-            a: s.law.clone(),
-            b: if both { s.wheel.clone() } else { s.law.clone() },
-            factor: vec![1.0; s.law.len()],
-            level: s.drag.iter().map(|f| f.abs()).collect(),
+        .map(|s| {
+            let force: Vec<f64> = s.drag.iter().map(|f| f.abs()).collect();
+            let beside = (CHANGE_S / step).ceil() as usize;
+            let change: Vec<f64> = (0..s.drag.len())
+                .map(|k| {
+                    let at = |k: usize| s.drag[k.min(s.drag.len() - 1)] - s.law[k.min(s.drag.len() - 1)];
+                    (at(k + beside) - at(k.saturating_sub(beside))).abs()
+                })
+                .collect();
+            Pair {
+                a: s.law.clone(),
+                b: if both { s.wheel.clone() } else { s.law.clone() },
+                factor: vec![1.0; s.law.len()],
+                levels: vec![highest(&force, reach), highest(&change, reach)],
+            }
         })
         .collect();
     let all = structure(&pairs, step, (SHORTEST_LAG, OWN_LAG_S));
     let memory = lasting(all.memory(true)?)?;
-    let calm = lasting(all.calmest(CALM_SHARE).memory(true)?)?;
-    // Physics grows with the force.
-    let differ = (memory.variance - calm.variance).abs();
-    (differ < 3.0 * memory.std.hypot(calm.std) && differ < 0.6 * memory.variance)
-        .then(|| sentence("drag_force_n", "drag", "N", &memory))
+    // Physics grows with the force, a lag with its change.
+    let at = memory.time.clamp(2.0 * step, CALM_S);
+    let size = |s: &Structure| s.at(at) - 3.0 * memory.white;
+    let whole = size(&all);
+    let same = |ranking: usize| {
+        let share = size(&all.calmest(ranking, CALM_SHARE)) / whole;
+        (CALM_RATIO..1.0 / CALM_RATIO).contains(&share)
+    };
+    (same(0) && same(1)).then(|| sentence("drag_force_n", "drag", "N", &memory))
+}
+
+/// Highest of the values within so many on either side.
+fn highest(values: &[f64], reach: usize) -> Vec<f64> {
+    (0..values.len())
+        .map(|k| {
+            values[k.saturating_sub(reach)..(k + reach + 1).min(values.len())]
+                .iter()
+                .copied()
+                .fold(0.0, f64::max)
+        })
+        .collect()
 }
 
 #[cfg(test)]

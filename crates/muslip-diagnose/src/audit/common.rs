@@ -16,6 +16,8 @@ struct Speeds {
     vehicle: Vec<f64>,
     wheel: Vec<f64>,
     impulse: Vec<f64>,
+    /// Wheel speed without what drag and brake make of it; empty where no brake is known.
+    unmoved: Vec<f64>,
     own: Vec<f64>,
 }
 
@@ -23,19 +25,22 @@ fn speeds(rig: &Rig, runs: &[Recording], every: usize) -> Vec<Speeds> {
     let mut out = Vec::new();
     for run in runs {
         for moving in &run.moving {
-            let mut impulse = 0.0;
+            let (mut impulse, mut braked) = (0.0, 0.0);
             let mut all = Speeds {
                 vehicle: Vec::new(),
                 wheel: Vec::new(),
                 impulse: Vec::new(),
+                unmoved: Vec::new(),
                 own: Vec::new(),
             };
-            let (mut sums, mut count) = ([0.0; 4], 0usize);
+            let (mut sums, mut count) = ([0.0; 5], 0usize);
             for k in moving.clone() {
                 if k > moving.start {
-                    impulse += 0.5
-                        * (run.drag.clean[k] + run.drag.clean[k - 1])
-                        * (run.time[k] - run.time[k - 1]);
+                    let half = 0.5 * (run.time[k] - run.time[k - 1]);
+                    impulse += half * (run.drag.clean[k] + run.drag.clean[k - 1]);
+                    if let Some((_, brake)) = &run.brake {
+                        braked += half * (brake.clean[k] + brake.clean[k - 1]);
+                    }
                 }
                 let v = run.speed.clean[k];
                 let free = if rig.coasting {
@@ -45,7 +50,7 @@ fn speeds(rig: &Rig, runs: &[Recording], every: usize) -> Vec<Speeds> {
                 };
                 for (sum, x) in sums
                     .iter_mut()
-                    .zip([free, run.wheel.clean[k], impulse, v])
+                    .zip([free, run.wheel.clean[k], impulse, v, braked])
                 {
                     *sum += x;
                 }
@@ -54,10 +59,14 @@ fn speeds(rig: &Rig, runs: &[Recording], every: usize) -> Vec<Speeds> {
                     let n = count as f64;
                     all.vehicle.push(sums[0] / n);
                     all.wheel.push(sums[1] / n);
-                    all.impulse
-                        .push(sums[2] / n * rig.radius_m / rig.wheel_inertia_kg_m2);
+                    let pushed = sums[2] / n * rig.radius_m / rig.wheel_inertia_kg_m2;
+                    all.impulse.push(pushed);
+                    if run.brake.is_some() {
+                        let braked = sums[4] / n / rig.wheel_inertia_kg_m2;
+                        all.unmoved.push(sums[1] / n - pushed + braked);
+                    }
                     all.own.push(sums[3] / n);
-                    (sums, count) = ([0.0; 4], 0);
+                    (sums, count) = ([0.0; 5], 0);
                 }
             }
             out.push(all);
@@ -96,11 +105,21 @@ fn shared(rig: &Rig, runs: &[Recording]) -> Option<Memory> {
                         if rolls { 1.0 / (v * w) } else { 0.0 }
                     })
                     .collect(),
-                level: vec![0.0; s.own.len()],
+                levels: Vec::new(),
             })
             .collect()
     };
     let range = (1, COMMON_LAG_S);
+    // A held speed owes the drag nothing: the wheel's own motion may be taken out, noise of its causes and all.
+    if !rig.coasting && speeds.iter().all(|s| s.unmoved.len() == s.wheel.len()) {
+        let quiet = structure(&pairs(|s| &s.unmoved), step, range).memory(false);
+        let seen = structure(&pairs(|s| &s.wheel), step, range).memory(false);
+        return [quiet, seen]
+            .into_iter()
+            .flatten()
+            .min_by(|a, b| a.std.total_cmp(&b.std))
+            .filter(Memory::is_sure);
+    }
     let both = structure(&pairs(|s| &s.wheel), step, range);
     let memory = both.memory(false).filter(Memory::is_sure)?;
     // A speed that truly wavers takes the wheel along by a force.
@@ -123,7 +142,7 @@ pub fn common(rig: &Rig, runs: &[Recording]) -> Option<Finding> {
     let mean = |pick: fn(&Recording) -> &Vec<f64>| {
         let (sum, count) = runs
             .iter()
-            .flat_map(|run| pick(run).iter().filter(|x| x.is_finite()))
+            .flat_map(|run| run.moving.iter().flat_map(move |m| &pick(run)[m.clone()]))
             .fold((0.0, 0.0), |(s, n), x| (s + x, n + 1.0));
         sum / f64::max(count, 1.0)
     };

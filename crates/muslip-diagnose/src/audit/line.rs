@@ -322,6 +322,12 @@ pub fn ripple_of_law(left: &[Stretch], step: f64) -> Option<Finding> {
         let weight: f64 = parts.iter().map(|p| p.1).sum();
         parts.iter().map(|p| p.0 * p.1).sum::<f64>() / weight.max(1e-300)
     };
+    // What white residuals give: no order is looked at beside that has less.
+    let squares = |x: &[f64]| x.iter().map(|x| x * x).sum::<f64>();
+    let rows: usize = rests.iter().map(Vec::len).sum();
+    let variance = rests.iter().map(|r| squares(r)).sum::<f64>() / rows.max(1) as f64;
+    let weight: f64 = left.iter().map(|s| 0.5 * squares(&s.slope)).sum();
+    let chance = 2.0 * variance * left.len() as f64 / weight.max(1e-300);
     let mut best: Option<(usize, f64, f64, Vec<(f64, f64)>)> = None;
     for order in ORDERS {
         // Fewer than four readings a period show none of it.
@@ -329,13 +335,16 @@ pub fn ripple_of_law(left: &[Stretch], step: f64) -> Option<Finding> {
             continue;
         }
         let own = ripples(left, &rests, order as f64, reach);
+        let power = mean(&own);
+        if power < 1.5 * chance {
+            continue;
+        }
         let mut beside: Vec<f64> = [-0.45, -0.3, -0.2, 0.2, 0.3, 0.45]
             .iter()
             .map(|off| mean(&ripples(left, &rests, order as f64 + off, reach)))
             .collect();
         let most = beside.iter().copied().fold(0.0, f64::max);
         let floor = median_in_place(&mut beside);
-        let power = mean(&own);
         if power > RIPPLE_RATIO * floor
             && power > 3.0 * most
             && best.as_ref().is_none_or(|b| power > b.1)

@@ -85,6 +85,8 @@ fn of_speeds(rig: &Rig, timings: &Timings, recordings: &[Recording]) -> Option<F
 
 /// Step of the grid for the drag's slow noise, s.
 const DRAG_STEP_S: f64 = 0.005;
+/// Step of the grid for ripple, s: a few of it a tooth of a commutator.
+const RIPPLE_STEP_S: f64 = 0.002;
 
 /// What shows beside the tyre's law: ripple, zero, slow noise of the drag.
 fn of_tyre(
@@ -97,10 +99,13 @@ fn of_tyre(
     let mut out = Vec::new();
     let step = timing::median_of(recordings, |run| run.step);
     let fitted = tyre::fitted(rig, recordings, timings);
-    let ripple = line::ripple(recordings).or_else(|| {
-        let step = step.max(0.002);
-        line::ripple_of_law(&fitted.as_ref()?.left(rig, recordings, step), step)
-    });
+    let ripple = fitted
+        .as_ref()
+        .and_then(|fitted| {
+            let step = step.max(RIPPLE_STEP_S);
+            line::ripple_of_law(&fitted.left(recordings, step), step)
+        })
+        .or_else(|| line::ripple(recordings));
     let zero = still::zero(recordings);
     let Some(fitted) = fitted else {
         out.extend(ripple);
@@ -108,7 +113,7 @@ fn of_tyre(
         return out;
     };
     let step = step.max(DRAG_STEP_S);
-    let left = fitted.left(rig, recordings, step);
+    let left = fitted.left(recordings, step);
     out.extend(zero.or_else(|| still::zero_of_law(&fitted, &left)));
     // A speed that errs, a filter, a line: the law shows them as the drag's.
     let other = [

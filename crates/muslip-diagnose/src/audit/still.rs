@@ -69,7 +69,9 @@ pub fn zero(runs: &[Recording]) -> Option<Finding> {
 /// Share of a zero by which law and balance may tell it differently.
 const ZERO_SHARE: f64 = 0.25;
 /// Fewest standard deviations of a zero that only the law tells.
-const ALONE_SIGMAS: f64 = 6.0;
+const ALONE_SIGMAS: f64 = 5.0;
+/// Factor on what the law's zero is said to be uncertain by: the law's form is only nearly a tyre's.
+const LAW_FACTOR: f64 = 2.0;
 
 /// Mean of what the drag leaves beside the wheel's balance, the brake's share taken out, with its standard deviation.
 fn intercept(left: &[Stretch]) -> Option<(f64, f64)> {
@@ -98,10 +100,9 @@ fn intercept(left: &[Stretch]) -> Option<(f64, f64)> {
 /// The drag channel's zero without a standstill: the law's symmetry and the wheel's balance have to tell the same one.
 #[must_use]
 pub fn zero_of_law(fitted: &Fitted, left: &[Stretch]) -> Option<Finding> {
-    let (law, law_std) = (fitted.unknowns[3], fitted.std[3]);
+    let (law, law_std) = (fitted.unknowns[3], LAW_FACTOR * fitted.std[3]);
     let (value, std) = if let Some((wheel, wheel_std)) = intercept(left) {
-        let agree = (law - wheel).abs()
-            < (3.0 * law_std.hypot(wheel_std)).min(ZERO_SHARE * law.abs().max(wheel.abs()));
+        let agree = (law - wheel).abs() < ZERO_SHARE * law.abs().max(wheel.abs());
         let (a, b) = (law_std.powi(-2), wheel_std.powi(-2));
         let sure = law.abs() > TOLD_SIGMAS * law_std && wheel.abs() > TOLD_SIGMAS * wheel_std;
         if !(agree && sure) {

@@ -18,8 +18,8 @@ pub struct Pair {
     pub b: Vec<f64>,
     /// Factor on the product at each point.
     pub factor: Vec<f64>,
-    /// What blocks are ranked by, at each point.
-    pub level: Vec<f64>,
+    /// What blocks are ranked by, at each point: as many rankings as wanted.
+    pub levels: Vec<Vec<f64>>,
 }
 
 /// What two series share.
@@ -62,7 +62,7 @@ pub struct Structure {
 struct Sums {
     /// Of each lag: products, squares of the first series, of the second, number.
     lags: Vec<[f64; 4]>,
-    level: f64,
+    levels: Vec<f64>,
     series: usize,
 }
 
@@ -85,7 +85,11 @@ pub fn structure(pairs: &[Pair], step: f64, (shortest, longest_s): (usize, f64))
             let end = (start + length).min(n);
             let mut sums = Sums {
                 lags: vec![[0.0; 4]; lags.len()],
-                level: pair.level[start..end].iter().sum::<f64>() / (end - start) as f64,
+                levels: pair
+                    .levels
+                    .iter()
+                    .map(|level| level[start..end].iter().copied().fold(0.0, f64::max))
+                    .collect(),
                 series,
             };
             for (sum, &lag) in sums.lags.iter_mut().zip(&lags) {
@@ -105,10 +109,10 @@ pub fn structure(pairs: &[Pair], step: f64, (shortest, longest_s): (usize, f64))
 }
 
 impl Structure {
-    /// The part of it whose blocks have a level of at most this share of all.
+    /// The part of it whose blocks are, in a ranking, among the lowest share of all.
     #[must_use]
-    pub fn calmest(&self, share: f64) -> Self {
-        let mut levels: Vec<f64> = self.blocks.iter().map(|b| b.level).collect();
+    pub fn calmest(&self, ranking: usize, share: f64) -> Self {
+        let mut levels: Vec<f64> = self.blocks.iter().map(|b| b.levels[ranking]).collect();
         levels.sort_by(f64::total_cmp);
         let most = levels
             .get((share * levels.len() as f64) as usize)
@@ -118,7 +122,7 @@ impl Structure {
             blocks: self
                 .blocks
                 .iter()
-                .filter(|b| b.level <= most)
+                .filter(|b| b.levels[ranking] <= most)
                 .cloned()
                 .collect(),
             ..self.clone()
@@ -313,7 +317,7 @@ mod tests {
             a,
             b,
             factor: vec![1.0; count],
-            level: vec![0.0; count],
+            levels: Vec::new(),
         }
     }
 

@@ -125,7 +125,7 @@ impl Fitted {
 
     /// What is left of the drag on a grid of a step in s.
     #[must_use]
-    pub fn left(&self, rig: &Rig, runs: &[Recording], step: f64) -> Vec<Stretch> {
+    pub fn left(&self, runs: &[Recording], step: f64) -> Vec<Stretch> {
         let mut without = self.unknowns;
         without[3] = 0.0;
         let mut rows = self.rows(runs, step).into_iter();
@@ -179,7 +179,6 @@ impl Fitted {
                 });
             }
         }
-        let _ = rig;
         out
     }
 }
