@@ -2,6 +2,7 @@
 
 use super::constants::{COLOURED_SHARE, LASTING_SHARE, LONGEST_COLOUR_S, OWN_LAG_S};
 use super::finding::{Finding, Word};
+use super::line;
 use super::recording::Recording;
 use super::structure::{Memory, Pair, Structure, structure};
 use super::tyre::Stretch;
@@ -59,6 +60,8 @@ const CALM_S: f64 = 0.2;
 const CHANGE_S: f64 = 0.015;
 /// Least share of the noise that calm blocks must have; as much more they may have.
 const CALM_RATIO: f64 = 0.5;
+/// Share of the noise's variance that may turn with the wheel.
+const LOCKED_SHARE: f64 = 0.2;
 
 fn sentence(channel: &str, of: &str, unit: &str, memory: &Memory) -> Finding {
     let (size, std) = memory.size();
@@ -139,6 +142,12 @@ pub fn of_drag(left: &[Stretch], step: f64) -> Option<Finding> {
         .collect();
     let all = structure(&pairs, step, (SHORTEST_LAG, OWN_LAG_S));
     let memory = lasting(all.memory(true)?)?;
+    // What is smoother than noise is a motion; what turns with the wheel is its run-out.
+    if !(memory.white > 0.0)
+        || line::locked(left, step) > LOCKED_SHARE * memory.variance
+    {
+        return None;
+    }
     // Physics grows with the force, a lag with its change.
     let at = memory.time.clamp(2.0 * step, CALM_S);
     let size = |s: &Structure| s.at(at) - 3.0 * memory.white;

@@ -312,6 +312,37 @@ fn ripples(left: &[Stretch], rests: &[Vec<f64>], order: f64, reach: usize) -> Ve
         .collect()
 }
 
+/// Variance of what the drag leaves beside the law that turns with the wheel and grows with the force.
+#[must_use]
+pub fn locked(left: &[Stretch], step: f64) -> f64 {
+    let reach = (0.5 * SMOOTH_S / step).ceil() as usize;
+    let forced: Vec<Stretch> = left
+        .iter()
+        .map(|s| Stretch {
+            slope: s.drag.clone(),
+            angle: s.angle.clone(),
+            hz: s.hz,
+            ..Stretch::default()
+        })
+        .collect();
+    let rests: Vec<Vec<f64>> = left.iter().map(|s| high_passed(&s.law, reach)).collect();
+    let rows: usize = rests.iter().map(Vec::len).sum();
+    let explained = |order: f64| -> f64 {
+        ripples(&forced, &rests, order, reach)
+            .iter()
+            .map(|(power, weight)| power * weight)
+            .sum::<f64>()
+    };
+    // Less what lies beside: noise has some everywhere.
+    (1..=4)
+        .map(|order| {
+            let order = f64::from(order);
+            (explained(order) - 0.5 * (explained(order - 0.4) + explained(order + 0.4))).max(0.0)
+        })
+        .sum::<f64>()
+        / rows.max(1) as f64
+}
+
 /// Ripple of the wheel speed by what it makes of the law's slip: also while the brake works.
 #[must_use]
 pub fn ripple_of_law(left: &[Stretch], step: f64) -> Option<Finding> {
