@@ -128,7 +128,8 @@ pub fn of_drag(left: &[Stretch], step: f64) -> Option<Finding> {
             let beside = (CHANGE_S / step).ceil() as usize;
             let change: Vec<f64> = (0..s.drag.len())
                 .map(|k| {
-                    let at = |k: usize| s.drag[k.min(s.drag.len() - 1)] - s.law[k.min(s.drag.len() - 1)];
+                    let at =
+                        |k: usize| s.drag[k.min(s.drag.len() - 1)] - s.law[k.min(s.drag.len() - 1)];
                     (at(k + beside) - at(k.saturating_sub(beside))).abs()
                 })
                 .collect();
@@ -143,9 +144,7 @@ pub fn of_drag(left: &[Stretch], step: f64) -> Option<Finding> {
     let all = structure(&pairs, step, (SHORTEST_LAG, OWN_LAG_S));
     let memory = lasting(all.memory(true)?)?;
     // What is smoother than noise is a motion; what turns with the wheel is its run-out.
-    if !(memory.white > 0.0)
-        || line::locked(left, step) > LOCKED_SHARE * memory.variance
-    {
+    if !(memory.white > 0.0) || line::locked(left, step) > LOCKED_SHARE * memory.variance {
         return None;
     }
     // Physics grows with the force, a lag with its change.

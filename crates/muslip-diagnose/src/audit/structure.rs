@@ -5,7 +5,8 @@
 //! Whatever runs straight has none.
 
 use super::constants::{
-    LONGEST_COLOUR_S, MEMORY_BLOCK_S, MEMORY_GROUPS, MEMORY_LAGS, MEMORY_MOTION_S, MEMORY_SIGMAS, MEMORY_TIMES,
+    LONGEST_COLOUR_S, MEMORY_BLOCK_S, MEMORY_GROUPS, MEMORY_LAGS, MEMORY_MOTION_S, MEMORY_SIGMAS,
+    MEMORY_TIMES,
 };
 use crate::smooth::median_in_place;
 
@@ -239,7 +240,11 @@ impl Structure {
                 (0.0, cx / cc)
             };
             // Neither variance is negative.
-            let (flat, lasting) = if flat < 0.0 { (0.0, cx / cc) } else { (flat, lasting) };
+            let (flat, lasting) = if flat < 0.0 {
+                (0.0, cx / cc)
+            } else {
+                (flat, lasting)
+            };
             let left = xx - flat * wx - lasting * cx;
             if left.is_finite() && best.is_none_or(|b| left < b.3) {
                 best = Some((lasting, time, flat, left));
@@ -327,7 +332,10 @@ mod tests {
             .memory(false)
             .unwrap();
         let (size, std) = found.size();
-        assert!(found.is_sure() && (size - 0.7).abs() < 3.0 * std.max(0.02), "{found:?}");
+        assert!(
+            found.is_sure() && (size - 0.7).abs() < 3.0 * std.max(0.02),
+            "{found:?}"
+        );
         assert!((found.time / 0.05).ln().abs() < 0.4, "{found:?}");
         let none = structure(&[pair(0.0, 12_000)], 0.005, (1, 0.3));
         assert!(!none.memory(false).unwrap().is_sure());
@@ -343,6 +351,11 @@ mod tests {
         assert!((found.white - 1.0).abs() < 0.25, "{found:?}");
         let mut white = pair(0.0, 12_000);
         white.b = white.a.clone();
-        assert!(!structure(&[white], 0.005, (1, 0.5)).memory(true).unwrap().is_sure());
+        assert!(
+            !structure(&[white], 0.005, (1, 0.5))
+                .memory(true)
+                .unwrap()
+                .is_sure()
+        );
     }
 }

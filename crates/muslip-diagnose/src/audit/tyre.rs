@@ -65,12 +65,7 @@ fn slopes(load: f64, slip: f64, x: &[f64; UNKNOWNS]) -> [f64; UNKNOWNS] {
     let u = (slip - x[2]) / critical;
     let bottom = 1.0 + u * u;
     let steep = load * x[0] * 2.0 * (1.0 - u * u) / (bottom * bottom);
-    [
-        load * 2.0 * u / bottom,
-        -steep * u,
-        -steep / critical,
-        1.0,
-    ]
+    [load * 2.0 * u / bottom, -steep * u, -steep / critical, 1.0]
 }
 
 fn grid(run: &Recording, from: usize, to: usize, step: f64) -> (f64, usize) {
@@ -104,8 +99,7 @@ impl Fitted {
                 let slow = |s: &super::signal::Signal, late: f64| {
                     s.averages(start + late, step, count, SMOOTH_S)
                 };
-                let (omega_s, speed_s) =
-                    (slow(&run.wheel.signal, w), slow(&run.speed.signal, v));
+                let (omega_s, speed_s) = (slow(&run.wheel.signal, w), slow(&run.speed.signal, v));
                 let load_s = slow(&run.load.signal, 0.0);
                 let slip = |omega: f64, speed: f64| 1.0 - self.radius * omega / speed.max(1e-3);
                 out.push(
@@ -217,12 +211,7 @@ pub fn fitted(rig: &Rig, runs: &[Recording], timings: &Timings) -> Option<Fitted
     let start = out.unknowns;
     // What is known beforehand: a tyre's friction and stiffness roughly, an error of the slip of half a percent.
     let scale = rows.iter().map(|r| r.drag.abs()).sum::<f64>() / rows.len() as f64;
-    let prior = [
-        0.5 * start[0],
-        0.7,
-        0.005,
-        f64::INFINITY,
-    ];
+    let prior = [0.5 * start[0], 0.7, 0.005, f64::INFINITY];
     let each = rows.len().div_ceil(PIECES);
     for pass in 0..8 {
         let x = out.unknowns;
@@ -240,7 +229,9 @@ pub fn fitted(rig: &Rig, runs: &[Recording], timings: &Timings) -> Option<Fitted
             pull += own;
             pulls.push(own);
         }
-        let variance = (sum / rows.len() as f64).max(1e-12 * scale * scale).max(1e-300);
+        let variance = (sum / rows.len() as f64)
+            .max(1e-12 * scale * scale)
+            .max(1e-300);
         for i in 0..UNKNOWNS {
             if prior[i].is_finite() {
                 // A long residual is no white one: what is known counts as ten rows' worth of it would.
@@ -291,7 +282,10 @@ pub(super) mod tests {
                 let mut moved = x;
                 moved[i] += 1e-6;
                 let slope = (law(3000.0, slip, &moved) - law(3000.0, slip, &x)) / 1e-6;
-                assert!((slope - told[i]).abs() < 1e-2 * slope.abs().max(1.0), "{i} {slope} {told:?}");
+                assert!(
+                    (slope - told[i]).abs() < 1e-2 * slope.abs().max(1.0),
+                    "{i} {slope} {told:?}"
+                );
             }
         }
     }
