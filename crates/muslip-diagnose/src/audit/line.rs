@@ -343,6 +343,9 @@ pub fn locked(left: &[Stretch], step: f64) -> f64 {
         / rows.max(1) as f64
 }
 
+/// An order with its power, the power beside it, and its stretches' powers and weights.
+type Order = (usize, f64, f64, Vec<(f64, f64)>);
+
 /// Ripple of the wheel speed by what it makes of the law's slip: also while the brake works.
 #[must_use]
 pub fn ripple_of_law(left: &[Stretch], step: f64) -> Option<Finding> {
@@ -359,7 +362,7 @@ pub fn ripple_of_law(left: &[Stretch], step: f64) -> Option<Finding> {
     let variance = rests.iter().map(|r| squares(r)).sum::<f64>() / rows.max(1) as f64;
     let weight: f64 = left.iter().map(|s| 0.5 * squares(&s.slope)).sum();
     let chance = 2.0 * variance * left.len() as f64 / weight.max(1e-300);
-    let mut best: Option<(usize, f64, f64, Vec<(f64, f64)>)> = None;
+    let mut best: Option<Order> = None;
     for order in ORDERS {
         // Fewer than four readings a period show none of it.
         if order as f64 * hz * step > 0.25 {
