@@ -86,3 +86,23 @@ pub const COLOURED_SHARE: f64 = 0.75;
 pub const LONGEST_COLOUR_S: f64 = 0.7;
 /// Share of its free-rolling speed from which a wheel counts as rolling.
 pub const ROLLING_SHARE: f64 = 0.95;
+/// Length of the blocks that second differences are summed over, s: shorter than a braking.
+pub const MEMORY_BLOCK_S: f64 = 0.3;
+/// Groups of blocks that are left out in turn for the spread.
+pub const MEMORY_GROUPS: usize = 12;
+/// Lags of second differences, evenly in their logarithm.
+pub const MEMORY_LAGS: usize = 20;
+/// Time constants that are tried.
+pub const MEMORY_TIMES: usize = 24;
+/// A memory is told from so many standard deviations of its variance.
+pub const MEMORY_SIGMAS: f64 = 4.0;
+/// Longest lag at which wheel and vehicle speed are compared, s.
+pub const COMMON_LAG_S: f64 = 0.3;
+/// A common error is told from this share of each speed's own noise.
+pub const COMMON_SHARE: f64 = 0.7;
+/// Longest lag at which a channel's own memory is looked for, s.
+pub const OWN_LAG_S: f64 = 0.8;
+/// A channel's lasting noise is told from this share of its white noise's standard deviation.
+pub const LASTING_SHARE: f64 = 0.7;
+/// Lag at which blocks are seen to move, s: noise has many such in a block.
+pub const MEMORY_MOTION_S: f64 = 0.02;

@@ -6,6 +6,7 @@ use super::constants::{
 use super::finding::{Finding, Word};
 use super::recording::Recording;
 use super::signal::Signal;
+use super::tyre::Stretch;
 use crate::smooth::median_in_place;
 
 /// Amplitude of a line in a series at given phases (rad): twice the mean of its product with the rotating pointer.
@@ -260,6 +261,145 @@ pub fn ripple(runs: &[Recording]) -> Option<Finding> {
         )
         .saying(format!(
             "The wheel speed varies by {:.2} % {times} a revolution.",
+            100.0 * value
+        ))
+    })
+}
+
+/// Readings less their mean over so many on either side.
+fn high_passed(values: &[f64], reach: usize) -> Vec<f64> {
+    let mut sums = vec![0.0];
+    for x in values {
+        sums.push(sums[sums.len() - 1] + x);
+    }
+    (0..values.len())
+        .map(|k| {
+            let (from, to) = (k.saturating_sub(reach), (k + reach + 1).min(values.len()));
+            values[k] - (sums[to] - sums[from]) / (to - from) as f64
+        })
+        .collect()
+}
+
+/// Squared amplitude of the wheel speed's relative ripple of an order in each stretch, by what the drag leaves beside the
+/// law, and the weight of each.
+fn ripples(left: &[Stretch], rests: &[Vec<f64>], order: f64, reach: usize) -> Vec<(f64, f64)> {
+    left.iter()
+        .zip(rests)
+        .map(|(stretch, rest)| {
+            let columns: (Vec<f64>, Vec<f64>) = stretch
+                .angle
+                .iter()
+                .zip(&stretch.slope)
+                .map(|(angle, slope)| {
+                    let (sin, cos) = (order * angle).sin_cos();
+                    (slope * cos, slope * sin)
+                })
+                .unzip();
+            let (c, s) = (
+                high_passed(&columns.0, reach),
+                high_passed(&columns.1, reach),
+            );
+            let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+            let (cc, cs, ss) = (dot(&c, &c), dot(&c, &s), dot(&s, &s));
+            let (cx, sx) = (dot(&c, rest), dot(&s, rest));
+            let det = cc * ss - cs * cs;
+            if !(det > 1e-6 * cc * ss) {
+                return (0.0, 0.0);
+            }
+            let (a, b) = ((ss * cx - cs * sx) / det, (cc * sx - cs * cx) / det);
+            (a * a + b * b, 0.5 * (cc + ss))
+        })
+        .collect()
+}
+
+/// Variance of what the drag leaves beside the law that turns with the wheel and grows with the force.
+#[must_use]
+pub fn locked(left: &[Stretch], step: f64) -> f64 {
+    let reach = (0.5 * SMOOTH_S / step).ceil() as usize;
+    let forced: Vec<Stretch> = left
+        .iter()
+        .map(|s| Stretch {
+            slope: s.drag.clone(),
+            angle: s.angle.clone(),
+            hz: s.hz,
+            ..Stretch::default()
+        })
+        .collect();
+    let rests: Vec<Vec<f64>> = left.iter().map(|s| high_passed(&s.law, reach)).collect();
+    let rows: usize = rests.iter().map(Vec::len).sum();
+    let explained = |order: f64| -> f64 {
+        ripples(&forced, &rests, order, reach)
+            .iter()
+            .map(|(power, weight)| power * weight)
+            .sum::<f64>()
+    };
+    // Less what lies beside: noise has some everywhere.
+    (1..=4)
+        .map(|order| {
+            let order = f64::from(order);
+            (explained(order) - 0.5 * (explained(order - 0.4) + explained(order + 0.4))).max(0.0)
+        })
+        .sum::<f64>()
+        / rows.max(1) as f64
+}
+
+/// An order with its power, the power beside it, and its stretches' powers and weights.
+type Order = (usize, f64, f64, Vec<(f64, f64)>);
+
+/// Ripple of the wheel speed by what it makes of the law's slip: also while the brake works.
+#[must_use]
+pub fn ripple_of_law(left: &[Stretch], step: f64) -> Option<Finding> {
+    let reach = (0.5 * SMOOTH_S / step).ceil() as usize;
+    let rests: Vec<Vec<f64>> = left.iter().map(|s| high_passed(&s.law, reach)).collect();
+    let hz = left.iter().map(|s| s.hz).fold(0.0, f64::max);
+    let mean = |parts: &[(f64, f64)]| {
+        let weight: f64 = parts.iter().map(|p| p.1).sum();
+        parts.iter().map(|p| p.0 * p.1).sum::<f64>() / weight.max(1e-300)
+    };
+    // What white residuals give: no order is looked at beside that has less.
+    let squares = |x: &[f64]| x.iter().map(|x| x * x).sum::<f64>();
+    let rows: usize = rests.iter().map(Vec::len).sum();
+    let variance = rests.iter().map(|r| squares(r)).sum::<f64>() / rows.max(1) as f64;
+    let weight: f64 = left.iter().map(|s| 0.5 * squares(&s.slope)).sum();
+    let chance = 2.0 * variance * left.len() as f64 / weight.max(1e-300);
+    let mut best: Option<Order> = None;
+    for order in ORDERS {
+        // Fewer than four readings a period show none of it.
+        if order as f64 * hz * step > 0.25 {
+            continue;
+        }
+        let own = ripples(left, &rests, order as f64, reach);
+        let power = mean(&own);
+        if power < 1.5 * chance {
+            continue;
+        }
+        let mut beside: Vec<f64> = [-0.45, -0.3, -0.2, 0.2, 0.3, 0.45]
+            .iter()
+            .map(|off| mean(&ripples(left, &rests, order as f64 + off, reach)))
+            .collect();
+        let most = beside.iter().copied().fold(0.0, f64::max);
+        let floor = median_in_place(&mut beside);
+        if power > RIPPLE_RATIO * floor
+            && power > 3.0 * most
+            && best.as_ref().is_none_or(|b| power > b.1)
+        {
+            best = Some((order, power, floor, own));
+        }
+    }
+    let (order, power, floor, parts) = best?;
+    let value = (power - floor).sqrt();
+    let weight: f64 = parts.iter().map(|p| p.1).sum();
+    // Left out in turn, each stretch by its weight.
+    let spread = parts
+        .iter()
+        .map(|p| (p.1 / weight * (p.0 - power)).powi(2))
+        .sum::<f64>()
+        .sqrt();
+    let std = (0.5 * spread / value).max(0.03 * value);
+    let several = parts.iter().filter(|p| p.0 > 0.25 * power).count();
+    (value > 4.0 * std && several >= 2).then(|| {
+        Finding::of("wheel_speed_rad_s", Word::Ripple, (value, std), "1").saying(format!(
+            "The wheel speed varies by {:.2} % {order} times a revolution.",
             100.0 * value
         ))
     })

@@ -7,12 +7,15 @@
 //! | narrow lines: hum, ripple | [`line`] |
 //! | what filters a channel passes | [`filter`] |
 //! | what is off at a standstill | [`still`] |
-//! | noise with a memory | [`colour`] |
+//! | noise with a memory | [`colour`], by [`structure`] |
+//! | what both speeds have in common | [`common`] |
+//! | what the drag leaves beside law and balance | [`tyre`] |
 //! | columns made from the drag | [`leak`] |
 //! | what it says | [`finding`] |
 //! | by which figures it decides | [`constants`] |
 
 pub mod colour;
+pub mod common;
 pub mod constants;
 pub mod filter;
 pub mod finding;
@@ -26,7 +29,9 @@ pub mod simple;
 pub mod squares;
 pub mod steps;
 pub mod still;
+pub mod structure;
 pub mod timing;
+pub mod tyre;
 pub mod vehicle;
 pub mod wheel;
 
@@ -65,6 +70,68 @@ fn slow_noise(timings: &Timings, recordings: &[Recording]) -> Option<Finding> {
     colour::of_vehicle(&left.residual, left.step, median_in_place(&mut white))
 }
 
+/// What the speeds err by, together or the vehicle's alone.
+fn of_speeds(rig: &Rig, timings: &Timings, recordings: &[Recording]) -> Option<Finding> {
+    common::common(rig, recordings).or_else(|| {
+        if rig.coasting {
+            slow_noise(timings, recordings)
+        } else if recordings.iter().any(|run| run.speed.hold.is_some()) {
+            None
+        } else {
+            colour::of_held(recordings)
+        }
+    })
+}
+
+/// Step of the grid for the drag's slow noise, s.
+const DRAG_STEP_S: f64 = 0.005;
+/// Step of the grid for ripple, s: a few of it a tooth of a commutator.
+const RIPPLE_STEP_S: f64 = 0.002;
+
+/// What shows beside the tyre's law: ripple, zero, slow noise of the drag.
+fn of_tyre(
+    rig: &Rig,
+    timings: &Timings,
+    recordings: &[Recording],
+    found: &[Finding],
+) -> Vec<Finding> {
+    let has = |word: Word| found.iter().any(|f| f.finding == word);
+    let mut out = Vec::new();
+    let step = timing::median_of(recordings, |run| run.step);
+    let fitted = tyre::fitted(rig, recordings, timings);
+    let ripple = fitted
+        .as_ref()
+        .and_then(|fitted| {
+            let step = step.max(RIPPLE_STEP_S);
+            line::ripple_of_law(&fitted.left(recordings, step), step)
+        })
+        .or_else(|| line::ripple(recordings));
+    let zero = still::zero(recordings);
+    let Some(fitted) = fitted else {
+        out.extend(ripple);
+        out.extend(zero);
+        return out;
+    };
+    let step = step.max(DRAG_STEP_S);
+    let left = fitted.left(recordings, step);
+    out.extend(zero.or_else(|| still::zero_of_law(&fitted, &left)));
+    // A speed that errs, a filter, a line: the law shows them as the drag's.
+    let other = [
+        Word::ColouredNoise,
+        Word::Held,
+        Word::Quantised,
+        Word::LowPassed,
+        Word::Hum,
+    ]
+    .into_iter()
+    .any(has);
+    if !other && ripple.is_none() {
+        out.extend(colour::of_drag(&left, step));
+    }
+    out.extend(ripple);
+    out
+}
+
 /// Audits the measuring chain of a campaign.
 #[must_use]
 pub fn audit(rig: &Rig, runs: &[Run]) -> Audit {
@@ -77,11 +144,11 @@ pub fn audit(rig: &Rig, runs: &[Run]) -> Audit {
     let mut findings = timing::findings(&timings, brake);
     findings.extend(simple::simple(runs, &recordings));
     findings.extend(line::hum(&recordings));
-    findings.extend(line::ripple(&recordings));
     findings.extend(leak::leaks(runs));
     findings.extend(filter::filters(&timings, &recordings));
-    findings.extend(still::zero(&recordings));
-    findings.extend(slow_noise(&timings, &recordings));
+    findings.extend(of_speeds(rig, &timings, &recordings));
+    let more = of_tyre(rig, &timings, &recordings, &findings);
+    findings.extend(more);
     Audit {
         wheel_late: timings.wheel,
         vehicle_late: timings.vehicle,

@@ -57,8 +57,13 @@ pub fn step_of(value: &[f64]) -> Option<(f64, f64)> {
     ))
 }
 
-/// The last decimal that a column is written with.
+/// The last decimal that a column is written with; zeros and values that repeat the one before do not tell.
 fn decimals_of(value: &[f64]) -> f64 {
+    let value: Vec<f64> = value
+        .windows(2)
+        .filter(|w| w[1] != w[0] && w[1] != 0.0)
+        .map(|w| w[1])
+        .collect();
     let mut unit = 1.0;
     for _ in 0..9 {
         let whole = value.iter().filter(|x| x.is_finite()).take(200).all(|x| {

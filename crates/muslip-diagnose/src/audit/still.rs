@@ -3,6 +3,7 @@
 use super::constants::TOLD_SIGMAS;
 use super::finding::{Finding, Word};
 use super::recording::Recording;
+use super::tyre::{Fitted, Stretch};
 
 /// Fewest samples at a standstill.
 const STILL_SAMPLES: usize = 20;
@@ -61,6 +62,64 @@ pub fn zero(runs: &[Recording]) -> Option<Finding> {
     (mean.abs() > TOLD_SIGMAS * std && std > 0.0).then(|| {
         Finding::of("drag_force_n", Word::Zero, (mean, std), "N").saying(format!(
             "The drag channel reads {mean:.2} N at a standstill."
+        ))
+    })
+}
+
+/// Share of a zero by which law and balance may tell it differently.
+const ZERO_SHARE: f64 = 0.25;
+/// Fewest standard deviations of a zero that only the law tells.
+const ALONE_SIGMAS: f64 = 5.0;
+/// Factor on what the law's zero is said to be uncertain by: the law's form is only nearly a tyre's.
+const LAW_FACTOR: f64 = 2.0;
+
+/// Mean of what the drag leaves beside the wheel's balance, the brake's share taken out, with its standard deviation.
+fn intercept(left: &[Stretch]) -> Option<(f64, f64)> {
+    if left.is_empty() || left.iter().any(|s| s.wheel.is_empty()) {
+        return None;
+    }
+    // Each stretch for itself: intercept of a straight line over the drag.
+    let mut zeros: Vec<f64> = Vec::new();
+    for stretch in left {
+        for (drag, rest) in stretch
+            .drag
+            .chunks(stretch.drag.len().div_ceil(3))
+            .zip(stretch.wheel.chunks(stretch.drag.len().div_ceil(3)))
+        {
+            if drag.len() >= STILL_SAMPLES {
+                zeros.push(rest.iter().sum::<f64>() / rest.len() as f64);
+            }
+        }
+    }
+    let count = zeros.len() as f64;
+    let mean = zeros.iter().sum::<f64>() / count;
+    let spread = zeros.iter().map(|z| (z - mean).powi(2)).sum::<f64>();
+    (count > 3.0).then(|| (mean, (spread / (count - 1.0) / count).sqrt()))
+}
+
+/// The drag channel's zero without a standstill: the law's symmetry and the wheel's balance have to tell the same one.
+#[must_use]
+pub fn zero_of_law(fitted: &Fitted, left: &[Stretch]) -> Option<Finding> {
+    let (law, law_std) = (fitted.unknowns[3], LAW_FACTOR * fitted.std[3]);
+    let (value, std) = if let Some((wheel, wheel_std)) = intercept(left) {
+        let agree = (law - wheel).abs() < ZERO_SHARE * law.abs().max(wheel.abs());
+        let (a, b) = (law_std.powi(-2), wheel_std.powi(-2));
+        let sure = law.abs() > TOLD_SIGMAS * law_std && wheel.abs() > TOLD_SIGMAS * wheel_std;
+        if !(agree && sure) {
+            return None;
+        }
+        (
+            (a * law + b * wheel) / (a + b),
+            (a + b).powf(-0.5).max(0.5 * (law - wheel).abs()),
+        )
+    } else if law.abs() > ALONE_SIGMAS * law_std {
+        (law, law_std)
+    } else {
+        return None;
+    };
+    (std > 0.0).then(|| {
+        Finding::of("drag_force_n", Word::Zero, (value, std), "N").saying(format!(
+            "The drag channel reads {value:.2} N where tyre and wheel have none."
         ))
     })
 }

@@ -47,7 +47,8 @@ fn delay(estimate: &Estimate, place: usize, held: f64, step: f64) -> Timing {
     }
 }
 
-fn median_of(runs: &[Recording], pick: impl Fn(&Recording) -> f64) -> f64 {
+/// Median of a figure over runs.
+pub(super) fn median_of(runs: &[Recording], pick: impl Fn(&Recording) -> f64) -> f64 {
     let mut values: Vec<f64> = runs.iter().map(pick).collect();
     if values.is_empty() {
         0.0

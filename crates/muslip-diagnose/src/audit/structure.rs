@@ -1,0 +1,361 @@
+//! Noise with a memory, read off second differences: of one series, or the part that two series share.
+//!
+//! Half the mean of the product of two series' second differences over a lag is three times the variance of what is
+//! white in both, and for a shared part of variance c² and time constant T it grows as c² (3 − 4 exp(−l/T) + exp(−2l/T)).
+//! Whatever runs straight has none.
+
+use super::constants::{
+    LONGEST_COLOUR_S, MEMORY_BLOCK_S, MEMORY_GROUPS, MEMORY_LAGS, MEMORY_MOTION_S, MEMORY_SIGMAS,
+    MEMORY_TIMES,
+};
+use crate::smooth::median_in_place;
+
+/// Two series on one even grid; products are multiplied by a weight of their own.
+#[derive(Clone, Debug, Default)]
+pub struct Pair {
+    /// First series.
+    pub a: Vec<f64>,
+    /// Second series.
+    pub b: Vec<f64>,
+    /// Factor on the product at each point.
+    pub factor: Vec<f64>,
+    /// What blocks are ranked by, at each point: as many rankings as wanted.
+    pub levels: Vec<Vec<f64>>,
+}
+
+/// What two series share.
+#[derive(Clone, Copy, Debug)]
+pub struct Memory {
+    /// Variance of the shared part that lasts.
+    pub variance: f64,
+    /// Its standard deviation.
+    pub std: f64,
+    /// Its time constant in s.
+    pub time: f64,
+    /// Variance of the shared part that is white.
+    pub white: f64,
+}
+
+impl Memory {
+    /// Standard deviation of the noise, and that figure's own.
+    #[must_use]
+    pub fn size(&self) -> (f64, f64) {
+        let size = self.variance.max(0.0).sqrt();
+        (size, 0.5 * self.std / size.max(1e-300))
+    }
+
+    /// Whether it is beyond chance.
+    #[must_use]
+    pub fn is_sure(&self) -> bool {
+        self.variance > MEMORY_SIGMAS * self.std && self.variance > 0.0
+    }
+}
+
+/// Sums of products over blocks, by lag.
+#[derive(Clone, Debug, Default)]
+pub struct Structure {
+    lags: Vec<usize>,
+    step: f64,
+    blocks: Vec<Sums>,
+}
+
+#[derive(Clone, Debug, Default)]
+struct Sums {
+    /// Of each lag: products, squares of the first series, of the second, number.
+    lags: Vec<[f64; 4]>,
+    levels: Vec<f64>,
+    series: usize,
+}
+
+/// Sums over all series on grids of a step in s, from a lag of so many steps to one in s.
+#[must_use]
+pub fn structure(pairs: &[Pair], step: f64, (shortest, longest_s): (usize, f64)) -> Structure {
+    let longest = ((longest_s / step) as usize).max(shortest + 4);
+    let mut lags: Vec<usize> = (0..MEMORY_LAGS)
+        .map(|i| {
+            let share = i as f64 / (MEMORY_LAGS - 1) as f64;
+            (shortest as f64 * (longest as f64 / shortest as f64).powf(share)).round() as usize
+        })
+        .collect();
+    lags.dedup();
+    let length = ((MEMORY_BLOCK_S / step) as usize).max(8);
+    let mut blocks = Vec::new();
+    for (series, pair) in pairs.iter().enumerate() {
+        let n = pair.a.len();
+        for start in (0..n).step_by(length) {
+            let end = (start + length).min(n);
+            let mut sums = Sums {
+                lags: vec![[0.0; 4]; lags.len()],
+                levels: pair
+                    .levels
+                    .iter()
+                    .map(|level| level[start..end].iter().copied().fold(0.0, f64::max))
+                    .collect(),
+                series,
+            };
+            for (sum, &lag) in sums.lags.iter_mut().zip(&lags) {
+                for k in start.max(lag)..end.min(n.saturating_sub(lag)) {
+                    let second = |x: &[f64]| x[k + lag] - 2.0 * x[k] + x[k - lag];
+                    let (a, b, f) = (second(&pair.a), second(&pair.b), pair.factor[k]);
+                    sum[0] += 0.5 * a * b * f;
+                    sum[1] += 0.5 * a * a * f;
+                    sum[2] += 0.5 * b * b * f;
+                    sum[3] += 1.0;
+                }
+            }
+            blocks.push(sums);
+        }
+    }
+    Structure { lags, step, blocks }
+}
+
+impl Structure {
+    /// The part of it whose blocks are, in a ranking, among the lowest share of all.
+    #[must_use]
+    pub fn calmest(&self, ranking: usize, share: f64) -> Self {
+        let mut levels: Vec<f64> = self.blocks.iter().map(|b| b.levels[ranking]).collect();
+        levels.sort_by(f64::total_cmp);
+        let most = levels
+            .get((share * levels.len() as f64) as usize)
+            .copied()
+            .unwrap_or(f64::INFINITY);
+        Self {
+            blocks: self
+                .blocks
+                .iter()
+                .filter(|b| b.levels[ranking] <= most)
+                .cloned()
+                .collect(),
+            ..self.clone()
+        }
+    }
+
+    /// How much moves in each block at a short lag, blocks as far around as a lag reaches taken together.
+    fn motions(&self, lag: usize) -> Vec<f64> {
+        let place = self
+            .lags
+            .iter()
+            .position(|l| *l as f64 * self.step >= MEMORY_MOTION_S)
+            .unwrap_or(0);
+        let own: Vec<[f64; 4]> = self.blocks.iter().map(|b| b.lags[place]).collect();
+        let reach = (lag as f64 * self.step / MEMORY_BLOCK_S).ceil() as usize;
+        (0..own.len())
+            .map(|k| {
+                let (from, to) = (k.saturating_sub(reach), (k + reach + 1).min(own.len()));
+                let (mut a, mut b, mut n) = (0.0, 0.0, 0.0);
+                for i in (from..to).filter(|&i| self.blocks[i].series == self.blocks[k].series) {
+                    a += own[i][1];
+                    b += own[i][2];
+                    n += own[i][3];
+                }
+                f64::max(a * b, 0.0).sqrt() / f64::max(n, 1.0)
+            })
+            .collect()
+    }
+
+    /// Products by lag with each block's weight: blocks in which much moves count little.
+    fn weighed(&self) -> Vec<Vec<[f64; 3]>> {
+        self.lags
+            .iter()
+            .enumerate()
+            .map(|(i, &lag)| {
+                let motions = self.motions(lag);
+                let usual = middle(
+                    motions
+                        .iter()
+                        .zip(&self.blocks)
+                        .filter(|(_, b)| b.lags[i][3] > 0.0)
+                        .map(|(m, _)| *m),
+                );
+                self.blocks
+                    .iter()
+                    .zip(&motions)
+                    .map(|(block, motion)| {
+                        let s = &block.lags[i];
+                        let weight = (usual + motion).powi(-2);
+                        if s[3] == 0.0 || !weight.is_finite() {
+                            return [0.0; 3];
+                        }
+                        [
+                            weight * s[0],
+                            weight * f64::max(s[1] * s[2], 0.0).sqrt(),
+                            weight * s[3],
+                        ]
+                    })
+                    .collect()
+            })
+            .collect()
+    }
+
+    /// Lag in s, mean product and mean size by lag, one group of blocks left out.
+    fn means(&self, weighed: &[Vec<[f64; 3]>], without: Option<usize>) -> Vec<(f64, f64, f64)> {
+        let group = self.blocks.len().div_ceil(MEMORY_GROUPS).max(1);
+        self.lags
+            .iter()
+            .zip(weighed)
+            .filter_map(|(&lag, blocks)| {
+                let mut sums = [0.0; 3];
+                for (k, block) in blocks.iter().enumerate() {
+                    if without != Some(k / group) {
+                        for (sum, x) in sums.iter_mut().zip(block) {
+                            *sum += x;
+                        }
+                    }
+                }
+                (sums[2] > 0.0)
+                    .then(|| (lag as f64 * self.step, sums[0] / sums[2], sums[1] / sums[2]))
+            })
+            .collect()
+    }
+
+    /// White and lasting variance with the time constant that fits best.
+    fn fit(means: &[(f64, f64, f64)], white: bool, step: f64) -> Option<(f64, f64, f64)> {
+        let mut best: Option<(f64, f64, f64, f64)> = None;
+        let longest = LONGEST_COLOUR_S.min(means.last()?.0);
+        let shortest = 0.8 * step.max(0.008);
+        for i in 0..MEMORY_TIMES {
+            let share = i as f64 / (MEMORY_TIMES - 1) as f64;
+            let time = shortest * (longest / shortest).max(1.0).powf(share);
+            // Normal equations of two unknowns.
+            let (mut ww, mut wc, mut cc, mut wx, mut cx, mut xx) = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0);
+            for &(lag, x, size) in means {
+                let weight = (size * size * lag).max(1e-300).recip();
+                let decay = (-lag / time).exp();
+                let column = 3.0 - 4.0 * decay + decay * decay;
+                let flat = if white { 3.0 } else { 0.0 };
+                ww += weight * flat * flat;
+                wc += weight * flat * column;
+                cc += weight * column * column;
+                wx += weight * flat * x;
+                cx += weight * column * x;
+                xx += weight * x * x;
+            }
+            let (flat, lasting) = if white {
+                let det = ww * cc - wc * wc;
+                if !(det > 1e-9 * ww * cc) {
+                    continue;
+                }
+                ((cc * wx - wc * cx) / det, (ww * cx - wc * wx) / det)
+            } else {
+                (0.0, cx / cc)
+            };
+            // Neither variance is negative.
+            let (flat, lasting) = if flat < 0.0 {
+                (0.0, cx / cc)
+            } else {
+                (flat, lasting)
+            };
+            let left = xx - flat * wx - lasting * cx;
+            if left.is_finite() && best.is_none_or(|b| left < b.3) {
+                best = Some((lasting, time, flat, left));
+            }
+        }
+        best.map(|b| (b.0, b.1, b.2))
+    }
+
+    /// What lasts in it; `white` where the series may share white noise as well.
+    #[must_use]
+    pub fn memory(&self, white: bool) -> Option<Memory> {
+        if self.blocks.len() < 2 * MEMORY_GROUPS {
+            return None;
+        }
+        let weighed = self.weighed();
+        let (variance, time, flat) = Self::fit(&self.means(&weighed, None), white, self.step)?;
+        let others: Vec<f64> = (0..MEMORY_GROUPS)
+            .filter_map(|g| Some(Self::fit(&self.means(&weighed, Some(g)), white, self.step)?.0))
+            .collect();
+        let count = others.len() as f64;
+        let mean = others.iter().sum::<f64>() / count;
+        let spread = others.iter().map(|x| (x - mean).powi(2)).sum::<f64>();
+        Some(Memory {
+            variance,
+            std: (spread * (count - 1.0) / count).sqrt(),
+            time,
+            white: flat,
+        })
+    }
+
+    /// Mean product at the lag nearest to one in s.
+    #[must_use]
+    pub fn at(&self, lag_s: f64) -> f64 {
+        self.means(&self.weighed(), None)
+            .into_iter()
+            .min_by(|a, b| (a.0 - lag_s).abs().total_cmp(&(b.0 - lag_s).abs()))
+            .map_or(0.0, |m| m.1)
+    }
+}
+
+/// Median of a series' sizes, for a factor that shall not depend on outliers.
+#[must_use]
+pub fn middle(values: impl Iterator<Item = f64>) -> f64 {
+    let mut values: Vec<f64> = values.collect();
+    median_in_place(&mut values)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn noise(state: &mut u64) -> f64 {
+        // Sum of four: nearly normal, of variance one.
+        (0..4)
+            .map(|_| {
+                *state = state
+                    .wrapping_mul(6_364_136_223_846_793_005)
+                    .wrapping_add(1_442_695_040_888_963_407);
+                3f64.sqrt() * ((*state >> 11) as f64 / (1u64 << 53) as f64 - 0.5)
+            })
+            .sum()
+    }
+
+    fn pair(shared: f64, count: usize) -> Pair {
+        let (mut state, mut x) = (5u64, 0.0);
+        let keep = (-0.005f64 / 0.05).exp();
+        let fresh = (1.0 - keep * keep).sqrt();
+        let (mut a, mut b) = (Vec::new(), Vec::new());
+        for k in 0..count {
+            x = keep * x + fresh * noise(&mut state);
+            a.push(shared * x + noise(&mut state) + 0.1 * k as f64);
+            b.push(shared * x + noise(&mut state));
+        }
+        Pair {
+            a,
+            b,
+            factor: vec![1.0; count],
+            levels: Vec::new(),
+        }
+    }
+
+    #[test]
+    fn what_two_series_share_is_found_and_what_they_do_not_is_not() {
+        let found = structure(&[pair(0.7, 12_000)], 0.005, (1, 0.3))
+            .memory(false)
+            .unwrap();
+        let (size, std) = found.size();
+        assert!(
+            found.is_sure() && (size - 0.7).abs() < 3.0 * std.max(0.02),
+            "{found:?}"
+        );
+        assert!((found.time / 0.05).ln().abs() < 0.4, "{found:?}");
+        let none = structure(&[pair(0.0, 12_000)], 0.005, (1, 0.3));
+        assert!(!none.memory(false).unwrap().is_sure());
+        assert!(structure(&[], 0.005, (1, 0.3)).memory(false).is_none());
+    }
+
+    #[test]
+    fn a_series_own_memory_is_told_from_its_white_noise() {
+        let mut one = pair(2.0, 12_000);
+        one.b = one.a.clone();
+        let found = structure(&[one], 0.005, (1, 0.5)).memory(true).unwrap();
+        assert!((found.variance.sqrt() - 2.0).abs() < 0.25, "{found:?}");
+        assert!((found.white - 1.0).abs() < 0.25, "{found:?}");
+        let mut white = pair(0.0, 12_000);
+        white.b = white.a.clone();
+        assert!(
+            !structure(&[white], 0.005, (1, 0.5))
+                .memory(true)
+                .unwrap()
+                .is_sure()
+        );
+    }
+}
