@@ -122,7 +122,7 @@ pub struct Repaired {
     /// Rig as declared.
     pub rig: Rig,
     /// How late the channels are against the drag: taken off before the repaired model runs.
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "Lateness::is_none")]
     pub late: Lateness,
     /// Base law alone, refitted: logarithms of peak friction and slip at the peak, and the input shares.
     pub base_alone: Vec<f64>,

@@ -7,7 +7,7 @@ use super::timing::Timings;
 
 fn passed(channel: &str, value: f64, std: f64) -> Finding {
     Finding::of(channel, Word::LowPassed, (value, std), "s").saying(format!(
-        "{channel} passes a low-pass filter whose time constants add up to {:.1} ms.",
+        "The channel {channel} passes a low-pass filter whose time constants add up to {:.1} ms.",
         1e3 * value
     ))
 }

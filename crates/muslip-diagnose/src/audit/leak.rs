@@ -64,7 +64,7 @@ pub fn leaks(runs: &[Run]) -> Vec<Finding> {
                     ..Finding::of(name, Word::Leaks, (level, (1.0 - level * level) / count.sqrt()), "1")
                 }
                 .saying(format!(
-                    "{name} reproduces the drag (correlation {level:.4}, of the noise alone {copied:.2}): it explains nothing."
+                    "The column {name} reproduces the drag (correlation {level:.4}, of the noise alone {copied:.2}): it explains nothing."
                 ))
             })
         })

@@ -29,8 +29,9 @@ fn quantised(name: &str, unit: &str, channels: &[&[f64]]) -> Option<Finding> {
         .count();
     let seen = 2 * agree > channels.len() && step > STEP_SHARE * median_in_place(&mut noises);
     seen.then(|| {
-        Finding::of(name, Word::Quantised, (step, 0.01 * step), unit)
-            .saying(format!("{name} moves in steps of {step:.4} {unit}."))
+        Finding::of(name, Word::Quantised, (step, 0.01 * step), unit).saying(format!(
+            "The channel {name} moves in steps of {step:.4} {unit}."
+        ))
     })
 }
 
@@ -52,7 +53,7 @@ fn held<'a>(name: &str, channels: impl Iterator<Item = &'a Channel>) -> Option<F
         / periods.len() as f64;
     (spread < 0.1 * period).then(|| {
         Finding::of(name, Word::Held, (period, spread.max(0.005 * period)), "s").saying(format!(
-            "{name} is renewed every {:.2} ms only and held in between.",
+            "The channel {name} is renewed every {:.2} ms only and held in between.",
             1e3 * period
         ))
     })

@@ -121,9 +121,8 @@ pub fn findings(timings: &Timings, brake: &str) -> Vec<Finding> {
     .map(|(channel, timing)| {
         let how = if timing.value > 0.0 { "late" } else { "early" };
         let said = format!(
-            "{channel} is {:.1} ms {how} (std {:.1} ms) against the drag channel.",
-            1e3 * timing.value.abs(),
-            1e3 * timing.std
+            "The channel {channel} is {:.1} ms {how} against the drag channel.",
+            1e3 * timing.value.abs()
         );
         Finding {
             relative_to: "drag_force_n".to_owned(),

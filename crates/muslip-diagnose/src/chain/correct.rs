@@ -23,6 +23,12 @@ pub struct Lateness {
 const SLOWEST: f64 = 0.1;
 
 impl Lateness {
+    /// Whether no channel is late.
+    #[must_use]
+    pub fn is_none(&self) -> bool {
+        *self == Self::default()
+    }
+
     /// Of the wheel speed at this reading of it.
     #[must_use]
     pub fn of_wheel(&self, wheel_speed: f64) -> f64 {

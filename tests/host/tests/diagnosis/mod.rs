@@ -101,6 +101,7 @@ pub fn repaired() -> Repaired {
         averaged: 1,
         proof_by_blocks: false,
         rig: rig(),
+        late: muslip_diagnose::chain::correct::Lateness::default(),
         base_alone: vec![0.82_f64.ln(), 0.141_f64.ln(), 0.0, 0.0, 0.0],
         base: vec![0.85_f64.ln(), 0.13_f64.ln(), 0.0, 0.0, 0.0],
         tyre: vec![
