@@ -5,9 +5,10 @@ use rayon::prelude::*;
 use crate::data::Data;
 use crate::innovations::candidates::{Candidate, Table, table};
 use crate::innovations::dependence::{self, Dependence};
-use crate::innovations::hypothesis::{Effort, Judged, capped, judge, table_grams, total};
+use crate::innovations::gram::total;
+use crate::innovations::hypothesis::{Effort, Judged, capped, judge, table_grams};
 use crate::innovations::noise::Slopes;
-use crate::innovations::rows::rows;
+use crate::innovations::rows::rows_of;
 use crate::innovations::screen::{Score, scores};
 use crate::mechanism::{Balance, Evidence, Id};
 use crate::model::{Model, Term};
@@ -113,8 +114,9 @@ fn unseen_gain(base: &Judged, with: &Judged, halves: bool) -> (f64, f64) {
 fn evidence(data: &Data, model: &Model) -> Vec<Evidence> {
     data.series
         .iter()
-        .map(|s| {
-            let r = rows::<f64>(&data.catalogue, model, &model.vector(), s, &data.context);
+        .enumerate()
+        .map(|(run, s)| {
+            let r = rows_of(data, model, run);
             let mut weight = vec![0.0; s.len()];
             for k in s.tyre.iter().flat_map(Clone::clone) {
                 weight[k] = s.drag_sigma.powi(-2).min(1e12);
@@ -291,7 +293,7 @@ fn tried(data: &Data, base: &Judged, claim: Claim, judged: Judged, chain_s: f64)
         .sum::<usize>();
     let lowered = match &claim {
         Claim::Mechanism(id, _) if through_force(*id) => {
-            Some(1.0 - residual(data, &judged.model) / residual(data, &base.model).max(1e-300))
+            Some(1.0 - judged.residual_n / base.residual_n.max(1e-300))
         }
         _ => None,
     };
@@ -330,24 +332,6 @@ fn memory_s(data: &Data, id: Id, entry: usize, model: &Model) -> Option<f64> {
         Id::RelaxationLength => Some(first / data.context.mean_speed),
         _ => None,
     }
-}
-
-/// Root mean square of the drag's residual in N.
-fn residual(data: &Data, model: &Model) -> f64 {
-    let (mut square, mut count) = (0.0, 0.0);
-    for s in &data.series {
-        let r = rows::<f64>(&data.catalogue, model, &model.vector(), s, &data.context);
-        if r.tyre.is_empty() {
-            continue;
-        }
-        for k in s.tyre.iter().flat_map(Clone::clone) {
-            if r.tyre[k].is_finite() {
-                square += r.tyre[k] * r.tyre[k];
-                count += 1.0;
-            }
-        }
-    }
-    (square / f64::max(count, 1.0)).sqrt()
 }
 
 /// Whether a trial stands.

@@ -122,6 +122,12 @@ pub fn knots(problem: &Problem<'_>, values: &[Vec<f64>], count: usize) -> Vec<f6
             );
         }
     }
+    knots_among(all, count)
+}
+
+/// The same among these values.
+#[must_use]
+pub fn knots_among(mut all: Vec<f64>, count: usize) -> Vec<f64> {
     if all.len() < 10 {
         return Vec::new();
     }

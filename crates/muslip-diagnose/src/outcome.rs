@@ -5,6 +5,9 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 
 pub use crate::audit::finding::{Finding as ChainFinding, Word as ChainWord};
+use crate::mechanism::Reported;
+use crate::omnibus::finite_or_zero;
+use crate::prepare::DataFault;
 use crate::repaired::Repaired;
 
 /// The one word of the verdict.
@@ -107,6 +110,27 @@ pub struct Figure {
     pub std: f64,
     /// Unit in ASCII.
     pub unit: String,
+}
+
+impl Figure {
+    /// Of what a mechanism reports.
+    pub(crate) fn new(reported: &Reported<f64>, std: f64) -> Self {
+        Self {
+            name: reported.name.to_owned(),
+            value: finite_or_zero(reported.value),
+            std: finite_or_zero(std).max(0.0),
+            unit: reported.unit.to_owned(),
+        }
+    }
+}
+
+/// First letter large, full stop at the end.
+pub(crate) fn sentence(text: &str) -> String {
+    let mut letters = text.chars();
+    match letters.next() {
+        Some(first) => format!("{}{}.", first.to_uppercase(), letters.as_str()),
+        None => String::new(),
+    }
 }
 
 /// Why a mechanism is believed.
@@ -231,6 +255,18 @@ pub struct Fault {
     pub end_s: f64,
     /// What is wrong.
     pub what: String,
+}
+
+impl From<&DataFault> for Fault {
+    fn from(fault: &DataFault) -> Self {
+        Self {
+            recording: fault.recording.clone(),
+            channel: fault.channel.clone(),
+            start_s: finite_or_zero(fault.start_s),
+            end_s: finite_or_zero(fault.end_s),
+            what: fault.what.clone(),
+        }
+    }
 }
 
 /// One run for a plot: what was measured and what the two models say, thinned to a readable number of points.

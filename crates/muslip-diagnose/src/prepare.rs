@@ -7,9 +7,11 @@ use core::ops::Range;
 
 use crate::campaign::{Rig, Run};
 use crate::cleaning::{clean, stretches};
-use crate::mechanism::Context;
+use crate::mechanism::{Balance, Context};
 use crate::smooth::{Smoothed, difference_sigma, median_in_place, smooth};
 
+/// A step of so many typical ones is a gap, over which nothing is joined.
+pub(crate) const GAP_STEPS: f64 = 3.5;
 /// Slowest speed at which slip is defined, in m/s.
 const MIN_SPEED: f64 = 0.5;
 /// Smallest usable normal force as a share of the recording's median.
@@ -113,6 +115,15 @@ impl Series {
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.time.is_empty()
+    }
+    /// Stretches usable in a balance; none where it cannot be formed.
+    #[must_use]
+    pub fn segments(&self, balance: Balance) -> &[Range<usize>] {
+        match balance {
+            Balance::Tyre => &self.tyre,
+            Balance::Wheel => &self.wheel_balance,
+            Balance::Vehicle => &self.vehicle_balance,
+        }
     }
     /// Slip from the smoothed speeds and the rig's radius; zero where it is not defined.
     #[must_use]
@@ -264,7 +275,7 @@ pub fn prepare(
     let mut breaks = vec![false; n];
     for k in 1..n {
         dt[k] = time[k] - time[k - 1];
-        breaks[k] = dt[k] > 3.5 * typical_dt;
+        breaks[k] = dt[k] > GAP_STEPS * typical_dt;
         if breaks[k] && dt[k] > 0.1 {
             faults.push(DataFault {
                 recording: name.to_owned(),

@@ -4,7 +4,7 @@ use super::constants::{
     FEWEST_BLOCKS, HELD_WIDTH_S, MOMENT_S2, MOST_ROWS, SPEED_WIDTH_S, WHEEL_RANGE_S, WHEEL_STEP_S,
 };
 use super::finding::Timing;
-use super::recording::{Block, Recording, blocks};
+use super::recording::{Block, Recording, blocks, spans};
 use super::signal::{Signal, low_pass};
 use super::squares::{Balance, Estimate, colour_of, refine};
 use super::vehicle::{constants_of, impulse_like, powers};
@@ -196,15 +196,7 @@ pub fn law(rig: &Rig, runs: &[Recording], vehicle: Timing, moment: f64) -> Optio
     if !(rig.radius_m > 0.0 && rig.peak_friction > 0.0 && rig.critical_slip > 0.0) {
         return None;
     }
-    let stretches: Vec<(usize, f64, f64)> = runs
-        .iter()
-        .enumerate()
-        .flat_map(|(r, run)| {
-            run.moving
-                .iter()
-                .map(move |m| (r, run.time[m.start], run.time[m.end - 1]))
-        })
-        .collect();
+    let stretches = spans(runs);
     let whole: f64 = stretches.iter().map(|(_, a, b)| b - a).sum();
     let step = WHEEL_STEP_S.max(whole / MOST_ROWS as f64);
     let (mut sum, mut count) = (0.0, 0.0);

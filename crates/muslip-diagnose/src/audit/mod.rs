@@ -4,7 +4,7 @@
 //! | --- | --- |
 //! | when each channel tells what happened | [`timing`]: [`vehicle`], [`wheel`], [`law`], all by [`squares`] |
 //! | what is held, what moves in steps | [`hold`], [`steps`], [`simple`] |
-//! | narrow lines: hum, ripple | [`line`] |
+//! | narrow lines: hum, ripple | [`mod@line`] |
 //! | what filters a channel passes | [`filter`] |
 //! | what is off at a standstill | [`still`] |
 //! | noise with a memory | [`colour`], by [`structure`] |

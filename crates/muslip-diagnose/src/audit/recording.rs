@@ -179,6 +179,19 @@ pub struct Block {
     pub count: usize,
 }
 
+/// Stretches in which the vehicle moves, over all runs: the run's position, start and end in s.
+#[must_use]
+pub fn spans(runs: &[Recording]) -> Vec<(usize, f64, f64)> {
+    runs.iter()
+        .enumerate()
+        .flat_map(|(r, run)| {
+            run.moving
+                .iter()
+                .map(move |m| (r, run.time[m.start], run.time[m.end - 1]))
+        })
+        .collect()
+}
+
 /// Even pieces of the stretches, `margin` s inside each (before, after), so many over all runs that their spread says something.
 #[must_use]
 pub fn blocks(

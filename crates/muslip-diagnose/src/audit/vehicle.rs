@@ -3,7 +3,7 @@
 use super::constants::{
     COARSE_STEP_S, FEWEST_BLOCKS, MOST_ROWS, SHORTEST_BLOCK_S, VEHICLE_RANGE_S, VEHICLE_STEP_S,
 };
-use super::recording::{Block, Recording, blocks};
+use super::recording::{Block, Recording, blocks, spans};
 use super::signal::low_pass;
 use super::squares::{Balance, Estimate, colour_of, refine, rest, scan_value};
 
@@ -132,15 +132,7 @@ pub struct Left {
 /// What the balance says: delay of v against the drag, and by what filter it is slower.
 #[must_use]
 pub fn vehicle(runs: &[Recording], mass: f64) -> Option<(Estimate, Left)> {
-    let stretches: Vec<(usize, f64, f64)> = runs
-        .iter()
-        .enumerate()
-        .flat_map(|(r, run)| {
-            run.moving
-                .iter()
-                .map(move |m| (r, run.time[m.start], run.time[m.end - 1]))
-        })
-        .collect();
+    let stretches = spans(runs);
     let whole: f64 = stretches.iter().map(|(_, a, b)| b - a).sum();
     let step = VEHICLE_STEP_S.max(whole / MOST_ROWS as f64);
     let balance = Vehicle {

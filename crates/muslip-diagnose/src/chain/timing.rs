@@ -5,8 +5,8 @@ use crate::ablation::Ablation;
 use crate::audit::Audit;
 use crate::campaign::{Rig, Run};
 use crate::data::Data;
-use crate::innovations::gram::solve;
-use crate::innovations::hypothesis::{Effort, Judged, judge, total};
+use crate::innovations::gram::{solve, total};
+use crate::innovations::hypothesis::{Effort, Judged, judge};
 use crate::model::{Model, TYRE_BASE};
 
 /// How late the channels are against the drag channel, with what is not known of it.

@@ -125,18 +125,7 @@ impl Outcome<'_> {
         base
     }
     pub(super) fn faults(&self) -> Vec<Fault> {
-        let mut faults: Vec<Fault> = self
-            .data
-            .faults
-            .iter()
-            .map(|f| Fault {
-                recording: f.recording.clone(),
-                channel: f.channel.clone(),
-                start_s: finite_or_zero(f.start_s),
-                end_s: finite_or_zero(f.end_s),
-                what: f.what.clone(),
-            })
-            .collect();
+        let mut faults: Vec<Fault> = self.data.faults.iter().map(Fault::from).collect();
         if self.tyre.is_none() {
             for s in &self.data.series {
                 faults.push(Fault {

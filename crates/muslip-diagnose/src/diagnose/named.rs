@@ -8,7 +8,7 @@ use crate::confidence::{alternatives, figures, membership};
 use crate::fit::Joint;
 use crate::mechanism::Reported;
 use crate::omnibus::finite_or_zero;
-use crate::outcome::{Alternative, Evidence, Figure, NamedMechanism, Unexplained};
+use crate::outcome::{Alternative, Evidence, Figure, NamedMechanism, Unexplained, sentence};
 use crate::separating::separating_test;
 use crate::tyre_stage::TyreStage;
 
@@ -59,12 +59,7 @@ impl Outcome<'_> {
                     equation: mechanism.equation().to_owned(),
                     parameters: reported
                         .iter()
-                        .map(|(r, std)| Figure {
-                            name: r.name.to_owned(),
-                            value: finite_or_zero(r.value),
-                            std: finite_or_zero(*std).max(0.0),
-                            unit: r.unit.to_owned(),
-                        })
+                        .map(|(r, std)| Figure::new(r, *std))
                         .collect(),
                     evidence: Evidence {
                         delta_bic: finite_or_zero(2.0 * (drop - price)),
@@ -117,14 +112,5 @@ impl Outcome<'_> {
                 share: (r.gain / (r.gain + explained).max(1e-9)).clamp(0.0, 1.0),
             })
             .collect()
-    }
-}
-
-/// First letter large, full stop at the end.
-fn sentence(text: &str) -> String {
-    let mut letters = text.chars();
-    match letters.next() {
-        Some(first) => format!("{}{}.", first.to_uppercase(), letters.as_str()),
-        None => String::new(),
     }
 }

@@ -5,11 +5,12 @@ use rayon::prelude::*;
 use super::dependence::Dependence;
 use super::gram::Columns;
 use super::noise::Slopes;
-use super::rows::{Rows, rows};
+use super::rows::{Rows, rows, rows_of};
 use crate::data::{Data, Listed, NARROW, WIDTH};
 use crate::mechanism::{Balance, Evidence, Id};
 use crate::model::{Model, Term};
 use crate::number::{Dual, Number};
+use crate::omnibus::finite_or_zero;
 
 /// Rows of one run by balance, in the order tyre, wheel, vehicle.
 pub type Triple = [Vec<f64>; 3];
@@ -59,13 +60,7 @@ fn values(rows: Rows<f64>) -> Triple {
 }
 
 fn plain(data: &Data, model: &Model, run: usize) -> Triple {
-    values(rows(
-        &data.catalogue,
-        model,
-        &model.vector(),
-        &data.series[run],
-        &data.context,
-    ))
+    values(rows_of(data, model, run))
 }
 
 /// Derivatives of the rows in the parameters `which` of the model's vector.
@@ -117,7 +112,7 @@ fn second(rate: &[f64], time: &[f64]) -> Vec<f64> {
         .map(|k| {
             let (a, b) = (k.saturating_sub(2), (k + 2).min(n - 1));
             let d = (rate[b] - rate[a]) / (time[b] - time[a]).max(1e-9);
-            if d.is_finite() { d } else { 0.0 }
+            finite_or_zero(d)
         })
         .collect()
 }
@@ -127,21 +122,15 @@ fn nuisances(data: &Data, slopes: &Slopes, run: usize) -> Vec<(Nuisance, Triple)
     let s = &data.series[run];
     let n = s.len();
     let (inertia, mass) = (data.context.inertia, data.context.mass);
-    let finite = |x: f64| if x.is_finite() { x } else { 0.0 };
-    let wheel_rate: Vec<f64> = s.wheel.rate.iter().map(|x| finite(*x)).collect();
-    let speed_rate: Vec<f64> = s.speed.rate.iter().map(|x| finite(*x)).collect();
+    let wheel_rate: Vec<f64> = s.wheel.rate.iter().map(|x| finite_or_zero(*x)).collect();
+    let speed_rate: Vec<f64> = s.speed.rate.iter().map(|x| finite_or_zero(*x)).collect();
     let wheel_second = second(&wheel_rate, &s.time);
     let speed_second = second(&speed_rate, &s.time);
-    let has = |b: Balance| match b {
-        Balance::Tyre => !s.tyre.is_empty(),
-        Balance::Wheel => s.torque.is_some() && !s.wheel_balance.is_empty(),
-        Balance::Vehicle => !s.vehicle_balance.is_empty(),
-    };
     let column = |b: Balance, f: &dyn Fn(usize) -> f64| -> Vec<f64> {
-        if has(b) {
-            (0..n).map(|k| finite(f(k))).collect()
-        } else {
+        if s.segments(b).is_empty() {
             Vec::new()
+        } else {
+            (0..n).map(|k| finite_or_zero(f(k))).collect()
         }
     };
     let by_wheel = |u: &dyn Fn(usize) -> f64| -> Triple {

@@ -5,12 +5,16 @@ use super::candidates::Triple;
 use crate::data::Data;
 use crate::mechanism::Balance;
 use crate::model::Model;
-use crate::omnibus::{Action, Levers, finite_or_zero, hat};
+use crate::omnibus::{Action, Levers, finite_or_zero, hat, knots_among};
 use crate::repaired::Correction;
 use crate::variable::Variable;
 
 /// Hat functions of a dependence.
 const KNOTS: usize = 7;
+/// Fewest of them: two are a straight line, which is no shape.
+const LEAST_KNOTS: usize = 3;
+/// Fewest values that knots are set among.
+const LEAST_SAMPLES: usize = 30;
 
 /// A dependence of one balance on one variable, as columns.
 #[derive(Clone)]
@@ -31,37 +35,21 @@ pub struct Dependence {
 fn knots(data: &Data, values: &[Vec<f64>], balance: Balance) -> Vec<f64> {
     let mut all: Vec<f64> = Vec::new();
     for (s, u) in data.series.iter().zip(values) {
-        let segments = match balance {
-            Balance::Tyre => &s.tyre,
-            Balance::Wheel => &s.wheel_balance,
-            Balance::Vehicle => &s.vehicle_balance,
-        };
+        let used = s.segments(balance).iter();
         all.extend(
-            segments
-                .iter()
-                .flat_map(|g| u[g.clone()].iter().step_by(3))
+            used.flat_map(|g| u[g.clone()].iter().step_by(3))
                 .filter(|v| v.is_finite()),
         );
     }
-    if all.len() < 30 {
+    if all.len() < LEAST_SAMPLES {
         return Vec::new();
     }
-    all.sort_by(f64::total_cmp);
-    let quantile = |q: f64| all[((all.len() - 1) as f64 * q) as usize];
-    let (low, high) = (quantile(0.005), quantile(0.995));
-    if !(high > low) {
-        return Vec::new();
+    let knots = knots_among(all, KNOTS);
+    if knots.len() < LEAST_KNOTS {
+        Vec::new()
+    } else {
+        knots
     }
-    let least = (high - low) / (6.0 * KNOTS as f64);
-    let mut out: Vec<f64> = Vec::new();
-    for i in 0..KNOTS {
-        let share = i as f64 / (KNOTS - 1) as f64;
-        let knot = 0.5 * quantile(0.005 + 0.99 * share) + 0.5 * (low + share * (high - low));
-        if out.last().is_none_or(|k| knot - k > least) {
-            out.push(knot);
-        }
-    }
-    if out.len() < 3 { Vec::new() } else { out }
 }
 
 /// All dependences that a campaign can show, about a model.
@@ -69,28 +57,13 @@ fn knots(data: &Data, values: &[Vec<f64>], balance: Balance) -> Vec<f64> {
 pub fn all(data: &Data, model: &Model) -> Vec<Dependence> {
     let levers = Levers::new(data, model);
     let mut out = Vec::new();
-    let balances = [
-        (
-            Balance::Tyre,
-            data.series.iter().any(|s| !s.tyre.is_empty()),
-        ),
-        (
-            Balance::Wheel,
-            data.series
-                .iter()
-                .any(|s| !s.wheel_balance.is_empty() && s.torque.is_some()),
-        ),
-        (
-            Balance::Vehicle,
-            data.series.iter().any(|s| !s.vehicle_balance.is_empty()),
-        ),
-    ];
+    let formed = |balance| data.series.iter().any(|s| !s.segments(balance).is_empty());
     for variable in Variable::all(data) {
         let values: Vec<Vec<f64>> = (0..data.series.len())
             .map(|run| variable.values(data, run))
             .collect();
-        for (balance, there) in balances {
-            if !there {
+        for balance in [Balance::Tyre, Balance::Wheel, Balance::Vehicle] {
+            if !formed(balance) {
                 continue;
             }
             let knots = knots(data, &values, balance);
@@ -138,17 +111,10 @@ fn columns(
     };
     (0..knots.len())
         .map(|c| {
-            let mut triple: Triple = [Vec::new(), Vec::new(), Vec::new()];
-            let zeros = || vec![0.0; n];
-            if !s.tyre.is_empty() {
-                triple[0] = zeros();
-            }
-            if !s.wheel_balance.is_empty() && s.torque.is_some() {
-                triple[1] = zeros();
-            }
-            if !s.vehicle_balance.is_empty() {
-                triple[2] = zeros();
-            }
+            let mut triple = [Balance::Tyre, Balance::Wheel, Balance::Vehicle].map(|b| {
+                let formed = !s.segments(b).is_empty();
+                vec![0.0; if formed { n } else { 0 }]
+            });
             let into = &mut triple[balance as usize];
             let mut sum = 0.0;
             for (k, into) in into.iter_mut().enumerate() {

@@ -1,6 +1,6 @@
 //! Sizes of the noise's parts by restricted maximum likelihood.
 
-use super::gram::{Columns, Gram, grams, solve};
+use super::gram::{Columns, grams, solve, total};
 use super::noise::BalanceParts;
 use crate::data::Data;
 
@@ -22,15 +22,7 @@ pub fn loss(
     precision: &dyn Fn(usize) -> f64,
     stride: usize,
 ) -> f64 {
-    let all = grams(data, parts, columns, stride);
-    let mut sum = Gram::empty(all.first().map_or(1, |g| g[0].products.nrows()));
-    for gram in &all {
-        for half in gram {
-            if half.count > 0 {
-                sum.add(half);
-            }
-        }
-    }
+    let sum = total(&grams(data, parts, columns, stride));
     if sum.count == 0 {
         return 0.0;
     }

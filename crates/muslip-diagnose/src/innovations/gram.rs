@@ -39,6 +39,16 @@ impl Gram {
     }
 }
 
+/// Sum over all runs and halves.
+#[must_use]
+pub fn total(grams: &[[Gram; 2]]) -> Gram {
+    let mut sum = Gram::empty(grams.first().map_or(1, |g| g[0].products.nrows()));
+    for half in grams.iter().flatten() {
+        sum.add(half);
+    }
+    sum
+}
+
 /// Inner products of every run's columns in one balance under its noise, first and second half apart.
 #[must_use]
 pub fn grams(

@@ -6,8 +6,9 @@ use nalgebra::DVector;
 use super::candidates::{Table, table};
 use super::dependence::Dependence;
 use super::estimate;
-use super::gram::{Gram, grams, solve};
+use super::gram::{Gram, grams, solve, total};
 use super::noise::{BalanceParts, Slopes, parts};
+use super::rows::rows_of;
 use super::screen::precision;
 use crate::data::Data;
 use crate::model::{Model, TYRE_BASE};
@@ -27,6 +28,8 @@ pub struct Judged {
     pub free: usize,
     /// Inner products of base, terms and nuisances by half run: `[run][half]`.
     pub grams: Vec<[Gram; 2]>,
+    /// Root mean square of the drag's residual in N.
+    pub residual_n: f64,
     /// Negative log likelihood of each run under parameters from all others.
     pub unseen: Vec<f64>,
     /// The same of each half run under parameters from all other halves.
@@ -71,8 +74,14 @@ fn bounds(data: &Data, model: &Model) -> Vec<(f64, f64)> {
     all
 }
 
-/// Sum over balances, by run and half.
-fn summed(data: &Data, parts: &[BalanceParts], table: &Table, stride: usize) -> Vec<[Gram; 2]> {
+/// Inner products of all columns of a table under this noise, summed over the balances, by run and half.
+#[must_use]
+pub fn table_grams(
+    data: &Data,
+    parts: &[BalanceParts],
+    table: &Table,
+    stride: usize,
+) -> Vec<[Gram; 2]> {
     let width = 1
         + table.base
         + table.nuisances.len()
@@ -86,34 +95,11 @@ fn summed(data: &Data, parts: &[BalanceParts], table: &Table, stride: usize) -> 
             stride,
         )) {
             for (into, own) in into.iter_mut().zip(own) {
-                if own.count > 0 {
-                    into.add(&own);
-                }
+                into.add(&own);
             }
         }
     }
     by_run
-}
-
-/// Sum over all runs and halves.
-#[must_use]
-pub fn total(grams: &[[Gram; 2]]) -> Gram {
-    let mut sum = Gram::empty(grams.first().map_or(1, |g| g[0].products.nrows()));
-    for half in grams.iter().flatten() {
-        sum.add(half);
-    }
-    sum
-}
-
-/// Grams of a table with all candidates under given noise.
-#[must_use]
-pub fn table_grams(
-    data: &Data,
-    parts: &[BalanceParts],
-    table: &Table,
-    stride: usize,
-) -> Vec<[Gram; 2]> {
-    summed(data, parts, table, stride)
 }
 
 /// The noise with every part at most as large as the sensors make plausible.
@@ -184,7 +170,7 @@ pub fn judge(
             refitted = true;
         }
         parts_now = Some(noise.clone());
-        let grams = summed(data, &noise, &table, effort.stride);
+        let grams = table_grams(data, &noise, &table, effort.stride);
         let sum = total(&grams);
         let chosen: Vec<usize> = (1..sum.products.nrows()).collect();
         let solved = solve(&sum.products, &chosen, &prior)?;
@@ -193,8 +179,11 @@ pub fn judge(
         let here = solve(&sum.products, &nuisances, &prior)?.rss + sum.log_variance;
         if last {
             let penalty: f64 = noise.iter().map(estimate::penalty).sum();
-            let unseen = unseen(&grams, &sum, &chosen, &prior, false)?;
-            let unseen_halves = unseen_of_halves(&grams, &sum, &chosen, &prior)?;
+            let unseen = |own: &Gram| outside(own, &sum, &chosen, &prior);
+            let runs = grams
+                .iter()
+                .map(|run| unseen(&total(core::slice::from_ref(run))));
+            let halves = grams.iter().flatten().map(unseen);
             let k = own.len();
             return Some(Judged {
                 loss: 0.5 * (sum.log_variance + solved.rss) + penalty,
@@ -205,11 +194,12 @@ pub fn judge(
                 nuisances: table.nuisances.len(),
                 prior: (0..sum.products.nrows()).map(prior).collect(),
                 left: solved.coefficients.clone(),
+                residual_n: drag_residual(data, &model),
+                unseen: runs.collect::<Option<_>>()?,
+                unseen_halves: halves.collect::<Option<_>>()?,
                 model,
                 parts: noise,
                 grams,
-                unseen,
-                unseen_halves,
             });
         }
         match &best {
@@ -221,9 +211,11 @@ pub fn judge(
             _ => {
                 best = Some((here, model.clone()));
                 step = Some(
-                    own.iter()
-                        .enumerate()
-                        .map(|(at, _)| solved.coefficients[at])
+                    solved
+                        .coefficients
+                        .iter()
+                        .take(own.len())
+                        .copied()
                         .collect(),
                 );
             }
@@ -249,36 +241,25 @@ pub fn judge(
     None
 }
 
-/// Negative log likelihood of each run under parameters from the others.
-fn unseen(
-    grams: &[[Gram; 2]],
-    sum: &Gram,
-    chosen: &[usize],
-    prior: &dyn Fn(usize) -> f64,
-    _halves: bool,
-) -> Option<Vec<f64>> {
-    grams
-        .iter()
-        .map(|halves| {
-            let own = total(core::slice::from_ref(halves));
-            outside(&own, sum, chosen, prior)
-        })
-        .collect()
+/// Root mean square of the drag's residual in N.
+fn drag_residual(data: &Data, model: &Model) -> f64 {
+    let (mut square, mut count) = (0.0, 0.0);
+    for (run, s) in data.series.iter().enumerate() {
+        let e = rows_of(data, model, run).tyre;
+        if e.is_empty() {
+            continue;
+        }
+        for k in s.tyre.iter().flat_map(Clone::clone) {
+            if e[k].is_finite() {
+                square += e[k] * e[k];
+                count += 1.0;
+            }
+        }
+    }
+    (square / f64::max(count, 1.0)).sqrt()
 }
 
-fn unseen_of_halves(
-    grams: &[[Gram; 2]],
-    sum: &Gram,
-    chosen: &[usize],
-    prior: &dyn Fn(usize) -> f64,
-) -> Option<Vec<f64>> {
-    grams
-        .iter()
-        .flatten()
-        .map(|own| outside(own, sum, chosen, prior))
-        .collect()
-}
-
+/// Negative log likelihood of a part of the readings under parameters from all others.
 fn outside(own: &Gram, sum: &Gram, chosen: &[usize], prior: &dyn Fn(usize) -> f64) -> Option<f64> {
     let rest = &sum.products - &own.products;
     let solved = solve(&rest, chosen, prior)?;

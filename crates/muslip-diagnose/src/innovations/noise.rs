@@ -3,6 +3,7 @@
 use super::whiten::{Kind, Part, Whitener};
 use crate::data::Data;
 use crate::mechanism::Balance;
+use crate::omnibus::finite_or_zero;
 
 /// One part of a balance's noise over the campaign.
 #[derive(Clone, Debug)]
@@ -71,15 +72,18 @@ impl Slopes {
                 } else {
                     (0.0, 0.0)
                 };
-                let finite = |x: f64| if x.is_finite() { x } else { 0.0 };
-                all[0].push(finite(-slope * radius / v));
-                all[1].push(finite(slope * radius * omega / (v * v)));
-                all[2].push(finite(force));
-                all[3].push(finite(slope));
+                all[0].push(finite_or_zero(-slope * radius / v));
+                all[1].push(finite_or_zero(slope * radius * omega / (v * v)));
+                all[2].push(finite_or_zero(force));
+                all[3].push(finite_or_zero(slope));
                 // Of x/(1 + x²): 2x (x² − 3)/(1 + x²)³.
                 let bend = load * 2.0 * peak / (critical * critical) * 2.0 * x * (x * x - 3.0)
                     / shape.powi(3);
-                all[4].push(if s.rolling[k] { finite(bend) } else { 0.0 });
+                all[4].push(if s.rolling[k] {
+                    finite_or_zero(bend)
+                } else {
+                    0.0
+                });
             }
             let [wheel, speed, force, slip, curvature] = all;
             out.wheel.push(wheel);
@@ -143,7 +147,8 @@ pub fn parts(data: &Data, slopes: &Slopes) -> Vec<BalanceParts> {
         .map(|s| s.time.iter().map(|t| t - s.time[0]).collect())
         .collect();
     let mut all = Vec::new();
-    if s.iter().any(|s| !s.tyre.is_empty()) {
+    let formed = |balance| s.iter().any(|s| !s.segments(balance).is_empty());
+    if formed(Balance::Tyre) {
         all.push(BalanceParts {
             balance: Balance::Tyre,
             sources: vec![
@@ -207,9 +212,7 @@ pub fn parts(data: &Data, slopes: &Slopes) -> Vec<BalanceParts> {
             ],
         });
     }
-    if s.iter()
-        .any(|s| !s.wheel_balance.is_empty() && s.torque.is_some())
-    {
+    if formed(Balance::Wheel) {
         let turned: Vec<Vec<f64>> = s
             .iter()
             .map(|s| {
@@ -270,7 +273,7 @@ pub fn parts(data: &Data, slopes: &Slopes) -> Vec<BalanceParts> {
             ],
         });
     }
-    if s.iter().any(|s| !s.vehicle_balance.is_empty()) {
+    if formed(Balance::Vehicle) {
         let impulse: Vec<Vec<f64>> = s.iter().map(|s| integral(&s.dt, &s.drag_smooth)).collect();
         let walk = drag * dt.sqrt();
         let level = mass * speed;
@@ -321,17 +324,6 @@ pub fn parts(data: &Data, slopes: &Slopes) -> Vec<BalanceParts> {
 }
 
 impl BalanceParts {
-    /// Usable stretches of a run in this balance.
-    #[must_use]
-    pub fn segments<'a>(&self, data: &'a Data, run: usize) -> &'a [core::ops::Range<usize>] {
-        let s = &data.series[run];
-        match self.balance {
-            Balance::Tyre => &s.tyre,
-            Balance::Wheel => &s.wheel_balance,
-            Balance::Vehicle => &s.vehicle_balance,
-        }
-    }
-
     /// Gains of the filter on every `stride`-th sample of one run.
     #[must_use]
     pub fn whitener(&self, data: &Data, run: usize, stride: usize) -> Whitener {
@@ -355,7 +347,7 @@ impl BalanceParts {
             .collect();
         Whitener::new(
             &data.series[run].time,
-            self.segments(data, run),
+            data.series[run].segments(self.balance),
             stride,
             &|_| white,
             &parts,

@@ -5,8 +5,8 @@
 //! z = m v + ∫(F + opposing) dt, in N s; F is the reading less what the model says that the load cell adds to the
 //! force in the contact. A constant of z means nothing: the whitening takes each stretch's level as unknown.
 
-use crate::data::{Catalogue, Listed};
-use crate::mechanism::{Context, Stage, State};
+use crate::data::{Catalogue, Data, Listed};
+use crate::mechanism::{Balance, Context, Stage, State};
 use crate::model::{Model, tyre};
 use crate::prepare::Series;
 
@@ -18,6 +18,25 @@ pub struct Rows<T> {
     pub wheel: Vec<T>,
     /// In N s.
     pub vehicle: Vec<T>,
+}
+
+impl<T> Rows<T> {
+    /// Those of one balance.
+    #[must_use]
+    pub fn of(&self, balance: Balance) -> &[T] {
+        match balance {
+            Balance::Tyre => &self.tyre,
+            Balance::Wheel => &self.wheel,
+            Balance::Vehicle => &self.vehicle,
+        }
+    }
+}
+
+/// Rows of a model at its own parameters on one run of a campaign.
+#[must_use]
+pub fn rows_of(data: &Data, model: &Model, run: usize) -> Rows<f64> {
+    let p = model.vector();
+    rows(&data.catalogue, model, &p, &data.series[run], &data.context)
 }
 
 /// Rows of a model. Terms act on every balance that they touch.

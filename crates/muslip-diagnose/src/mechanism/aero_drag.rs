@@ -1,5 +1,6 @@
 //! A deceleration that grows with speed squared and is not tyre drag.
 
+use super::guide::runs;
 use super::{
     Alias, Balance, Compensation, Context, Describe, Evidence, Example, Guide, Id, Kind, Law,
     Mechanism, Memory, Parameter, Reported, Sign, Stage, State,
@@ -50,17 +51,17 @@ impl Describe for AeroDrag {
                 Alias {
                     with: Id::GradeOrDrive,
                     why: "In a narrow range of speed its square is a constant.",
-                    run: "Coast down unbraked from the highest speed, in both directions of the track.",
+                    run: runs::COAST_DOWN,
                 },
                 Alias {
                     with: Id::VehicleInertia,
                     why: "Where all stops begin at one speed, deceleration goes with it.",
-                    run: "Coast down unbraked from the highest speed, in both directions of the track.",
+                    run: runs::COAST_DOWN,
                 },
                 Alias {
                     with: Id::ForceGain,
                     why: "Where all stops begin at one speed, drag goes with it.",
-                    run: "Coast down unbraked from the highest speed, in both directions of the track.",
+                    run: runs::COAST_DOWN,
                 },
             ],
             smallest: "three percent of the largest drag at the largest speed",

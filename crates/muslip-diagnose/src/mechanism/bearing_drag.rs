@@ -1,5 +1,6 @@
 //! A torque that opposes rotation, beside brake and tyre.
 
+use super::guide::runs;
 use super::{
     Alias, Balance, Compensation, Context, Describe, Evidence, Example, Guide, Id, Kind, Law,
     Mechanism, Memory, Parameter, Reported, Sign, Stage, State,
@@ -94,7 +95,7 @@ impl Describe for BearingDrag {
             aliases: &[Alias {
                 with: Id::WheelInertia,
                 why: "Where the wheel always slows at one rate, an inertia is a torque.",
-                run: "Spin the lifted wheel up and apply the brake in steps, cold and hot: inertia and bearing show in the coast-down, lag and fade in the stops.",
+                run: runs::BRAKE_LIFTED,
             }],
             smallest: "three percent of the largest drag at the radius",
             smallest_size: |c| 0.03 * c.max_drag.max(c.drag_sigma) * c.radius,

@@ -1,5 +1,6 @@
 //! Torque per pressure falls with brake temperature.
 
+use super::guide::runs;
 use super::{
     Alias, Balance, Compensation, Context, Describe, Evidence, Example, Guide, Id, Kind, Law,
     Mechanism, Memory, Parameter, Reported, Sign, Stage, State,
@@ -81,22 +82,22 @@ impl Describe for BrakeFade {
                 Alias {
                     with: Id::BrakeLag,
                     why: "Both take torque from a rising pressure.",
-                    run: "Spin the lifted wheel up and apply the brake in steps, cold and hot: inertia and bearing show in the coast-down, lag and fade in the stops.",
+                    run: runs::BRAKE_LIFTED,
                 },
                 Alias {
                     with: Id::WheelInertia,
                     why: "Torque that is missing and inertia that is too small slow the wheel alike.",
-                    run: "Spin the lifted wheel up and apply the brake in steps, cold and hot: inertia and bearing show in the coast-down, lag and fade in the stops.",
+                    run: runs::BRAKE_LIFTED,
                 },
                 Alias {
                     with: Id::BearingDrag,
                     why: "Torque that fades is a torque of the other sign beside the brake.",
-                    run: "Spin the lifted wheel up and apply the brake in steps, cold and hot: inertia and bearing show in the coast-down, lag and fade in the stops.",
+                    run: runs::BRAKE_LIFTED,
                 },
                 Alias {
                     with: Id::ForceGain,
                     why: "The wheel's balance weighs torque against drag: either scale may be wrong.",
-                    run: "Spin the lifted wheel up and apply the brake in steps, cold and hot: inertia and bearing show in the coast-down, lag and fade in the stops.",
+                    run: runs::BRAKE_LIFTED,
                 },
             ],
             smallest: "five percent of the torque",

@@ -1,6 +1,7 @@
 //! Brake torque follows pressure with a lag.
 
 use super::filters::first_order;
+use super::guide::runs;
 use super::{
     Alias, Balance, Compensation, Context, Describe, Evidence, Example, Guide, Id, Kind, Law,
     Mechanism, Memory, Parameter, Reported, Sign, Stage, State,
@@ -58,12 +59,12 @@ impl Describe for BrakeLag {
                 Alias {
                     with: Id::WheelInertia,
                     why: "Both delay how the wheel answers a step.",
-                    run: "Spin the lifted wheel up and apply the brake in steps, cold and hot: inertia and bearing show in the coast-down, lag and fade in the stops.",
+                    run: runs::BRAKE_LIFTED,
                 },
                 Alias {
                     with: Id::BearingDrag,
                     why: "On ramps a lag is a constant torque that is missing.",
-                    run: "Spin the lifted wheel up and apply the brake in steps, cold and hot: inertia and bearing show in the coast-down, lag and fade in the stops.",
+                    run: runs::BRAKE_LIFTED,
                 },
             ],
             smallest: "five milliseconds; one to two are within the bias of ideal sensors",

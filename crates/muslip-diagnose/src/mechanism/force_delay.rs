@@ -1,5 +1,6 @@
 //! The drag channel reports late by a fixed time.
 
+use super::guide::runs;
 use super::{
     Alias, Balance, Compensation, Context, Describe, Evidence, Example, Guide, Id, Kind, Law,
     Mechanism, Memory, Parameter, Reported, Sign, Stage, State,
@@ -57,27 +58,27 @@ impl Describe for ForceDelay {
                 Alias {
                     with: Id::RelaxationLength,
                     why: "At one speed a distance is a time.",
-                    run: "Repeat the same brake ramp at a third and at three times the speed: a lag of the channel keeps its time, a relaxation length keeps its distance.",
+                    run: runs::RAMP_SPEEDS,
                 },
                 Alias {
                     with: Id::SlipHysteresis,
                     why: "At one rate of slip what comes late opens the same loop.",
-                    run: "Repeat the same brake ramp at a third and at three times the speed: a lag of the channel keeps its time, a relaxation length keeps its distance.",
+                    run: runs::RAMP_SPEEDS,
                 },
                 Alias {
                     with: Id::ForceLag,
                     why: "A short filter delays slow features by its time constant.",
-                    run: "Tap the load cell (an impulse, wheel standing): a delay keeps the pulse's shape, a filter widens it, a resonance rings.",
+                    run: runs::TAP_IMPULSE,
                 },
                 Alias {
                     with: Id::StructuralResonance,
                     why: "Far below its frequency a resonance is a delay of 2 zeta/W.",
-                    run: "Tap the load cell (an impulse, wheel standing): a delay keeps the pulse's shape, a filter widens it, a resonance rings.",
+                    run: runs::TAP_IMPULSE,
                 },
                 Alias {
                     with: Id::InertialReaction,
                     why: "When the wheel slows before the force falls, its acceleration looks like the force's past.",
-                    run: "Spin the lifted wheel up and stop it with the brake: a reaction shows without any tyre force.",
+                    run: runs::STOP_LIFTED,
                 },
             ],
             smallest: "five milliseconds, less where slip moves fast",

@@ -1,5 +1,6 @@
 //! The drag channel's scale is wrong.
 
+use super::guide::runs;
 use super::{
     Alias, Balance, Compensation, Context, Describe, Evidence, Example, Guide, Id, Kind, Law,
     Mechanism, Memory, Parameter, Reported, Sign, Stage, State,
@@ -48,22 +49,22 @@ impl Describe for ForceGain {
                 Alias {
                     with: Id::VehicleInertia,
                     why: "Force over mass is all that a deceleration shows.",
-                    run: "Hang a known weight on the load cell; or ballast the vehicle by a known mass and repeat the stop.",
+                    run: runs::KNOWN_WEIGHT,
                 },
                 Alias {
                     with: Id::WheelInertia,
                     why: "Torque over inertia is all that the wheel's acceleration shows.",
-                    run: "Hang a known weight on the load cell; or ballast the vehicle by a known mass and repeat the stop.",
+                    run: runs::KNOWN_WEIGHT,
                 },
                 Alias {
                     with: Id::BearingDrag,
                     why: "Under a steady drag a share of it is a constant torque.",
-                    run: "Hang a known weight on the load cell; or ballast the vehicle by a known mass and repeat the stop.",
+                    run: runs::KNOWN_WEIGHT,
                 },
                 Alias {
                     with: Id::GradeOrDrive,
                     why: "Under a steady drag a share of it is a constant force.",
-                    run: "Hang a known weight on the load cell; or ballast the vehicle by a known mass and repeat the stop.",
+                    run: runs::KNOWN_WEIGHT,
                 },
             ],
             smallest: "three percent of the scale",

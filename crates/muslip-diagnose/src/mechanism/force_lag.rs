@@ -1,6 +1,7 @@
 //! The drag channel passes a first-order low-pass filter.
 
 use super::filters::first_order;
+use super::guide::runs;
 use super::{
     Alias, Balance, Compensation, Context, Describe, Evidence, Example, Guide, Id, Kind, Law,
     Mechanism, Memory, Parameter, Reported, Sign, Stage, State,
@@ -58,22 +59,22 @@ impl Describe for ForceLag {
                 Alias {
                     with: Id::RelaxationLength,
                     why: "At one speed a distance is a time.",
-                    run: "Repeat the same brake ramp at a third and at three times the speed: a lag of the channel keeps its time, a relaxation length keeps its distance.",
+                    run: runs::RAMP_SPEEDS,
                 },
                 Alias {
                     with: Id::SlipHysteresis,
                     why: "At one rate of slip what comes late opens the same loop.",
-                    run: "Repeat the same brake ramp at a third and at three times the speed: a lag of the channel keeps its time, a relaxation length keeps its distance.",
+                    run: runs::RAMP_SPEEDS,
                 },
                 Alias {
                     with: Id::StructuralResonance,
                     why: "Both filter; well damped they are nearly one.",
-                    run: "Tap the load cell with the wheel standing, then repeat the ramp at another speed: a resonance keeps its frequency.",
+                    run: runs::TAP_STANDING,
                 },
                 Alias {
                     with: Id::InertialReaction,
                     why: "When the wheel slows before the force falls, its acceleration looks like the force's past.",
-                    run: "Spin the lifted wheel up and stop it with the brake: a reaction shows without any tyre force.",
+                    run: runs::STOP_LIFTED,
                 },
             ],
             smallest: "five milliseconds, less where slip moves fast",

@@ -1,5 +1,6 @@
 //! A constant deceleration or acceleration that is not tyre drag.
 
+use super::guide::runs;
 use super::{
     Alias, Balance, Compensation, Context, Describe, Evidence, Example, Guide, Id, Kind, Law,
     Mechanism, Memory, Parameter, Reported, Sign, Stage, State,
@@ -53,7 +54,7 @@ impl Describe for GradeOrDrive {
             aliases: &[Alias {
                 with: Id::VehicleInertia,
                 why: "Under a steady drag a share of the deceleration is a constant.",
-                run: "Coast down unbraked from the highest speed, in both directions of the track.",
+                run: runs::COAST_DOWN,
             }],
             smallest: "three percent of the largest drag",
             smallest_size: |c| 0.03 * c.max_drag.max(c.drag_sigma),

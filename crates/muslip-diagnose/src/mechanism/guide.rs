@@ -5,6 +5,41 @@
 
 use super::{Balance, Context, Id, Mechanism, catalogue};
 
+/// Runs that tell several pairs apart, each told once.
+pub mod runs {
+    /// Brake lifted.
+    pub const BRAKE_LIFTED: &str = "Spin the lifted wheel up and apply the brake in steps, cold and hot: inertia and bearing show in the coast-down, lag and fade in the stops.";
+    /// Rests.
+    pub const RESTS: &str = "Repeat the same ramp after rests of 0, 30 and 120 s: heat recovers, wear does not, speed and shape do not care.";
+    /// Ramp speeds.
+    pub const RAMP_SPEEDS: &str = "Repeat the same brake ramp at a third and at three times the speed: a lag of the channel keeps its time, a relaxation length keeps its distance.";
+    /// Stop lifted.
+    pub const STOP_LIFTED: &str = "Spin the lifted wheel up and stop it with the brake: a reaction shows without any tyre force.";
+    /// Known weight.
+    pub const KNOWN_WEIGHT: &str = "Hang a known weight on the load cell; or ballast the vehicle by a known mass and repeat the stop.";
+    /// Coast down.
+    pub const COAST_DOWN: &str =
+        "Coast down unbraked from the highest speed, in both directions of the track.";
+    /// Tap standing.
+    pub const TAP_STANDING: &str = "Tap the load cell with the wheel standing, then repeat the ramp at another speed: a resonance keeps its frequency.";
+    /// Free speeds.
+    pub const FREE_SPEEDS: &str = "Speed up and slow down in a freely rolling wheel, brake released: a late speed shows as slip in proportion to the acceleration, a force that is late shows nothing.";
+    /// Track again.
+    pub const TRACK_AGAIN: &str = "Run the same track again, entering it ten metres later: a patch stays where it is on the track.";
+    /// Two speeds.
+    pub const TWO_SPEEDS: &str = "Repeat the ramp at two speeds a factor of three apart, at one load: shape follows slip, speed sensitivity follows sliding speed.";
+    /// First run again.
+    pub const FIRST_RUN_AGAIN: &str = "Repeat the first run at the end, and read the zero with the wheel lifted before and after.";
+    /// Load steps.
+    pub const LOAD_STEPS: &str = "Load the standing wheel in steps, brake released: crosstalk moves the reading with the load, nothing else does.";
+    /// Tap impulse.
+    pub const TAP_IMPULSE: &str = "Tap the load cell (an impulse, wheel standing): a delay keeps the pulse's shape, a filter widens it, a resonance rings.";
+    /// Tap brake.
+    pub const TAP_BRAKE: &str = "Tap the brake of the wheel at a held vehicle speed, then change the vehicle speed with the wheel rolling freely: each delay shows in the one that moves its own channel.";
+    /// Roll and drive.
+    pub const ROLL_AND_DRIVE: &str = "Roll unbraked and then drive the wheel slightly: rolling resistance stays, a wrong radius changes its sign with slip.";
+}
+
 /// Where a mechanism sits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {

@@ -1,5 +1,6 @@
 //! The drag channel also reads a share of the wheel's angular acceleration.
 
+use super::guide::runs;
 use super::{
     Alias, Balance, Compensation, Context, Describe, Evidence, Example, Guide, Id, Kind, Law,
     Mechanism, Memory, Parameter, Reported, Sign, Stage, State,
@@ -55,12 +56,12 @@ impl Describe for InertialReaction {
                 Alias {
                     with: Id::SlipHysteresis,
                     why: "The wheel slows while slip rises and speeds up while it falls.",
-                    run: "Spin the lifted wheel up and stop it with the brake: a reaction shows without any tyre force.",
+                    run: runs::STOP_LIFTED,
                 },
                 Alias {
                     with: Id::RelaxationLength,
                     why: "What is in proportion to the rate of slip looks like a lag.",
-                    run: "Spin the lifted wheel up and stop it with the brake: a reaction shows without any tyre force.",
+                    run: runs::STOP_LIFTED,
                 },
             ],
             smallest: "a tenth of what the wheel's whole inertia would make at its radius",

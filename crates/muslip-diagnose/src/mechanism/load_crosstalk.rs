@@ -1,5 +1,6 @@
 //! The drag channel reads a share of the normal force, also at standstill.
 
+use super::guide::runs;
 use super::{
     Alias, Balance, Compensation, Context, Describe, Evidence, Example, Guide, Id, Kind, Law,
     Mechanism, Memory, Parameter, Reported, Sign, Stage, State,
@@ -48,17 +49,17 @@ impl Describe for LoadCrosstalk {
                 Alias {
                     with: Id::RollingResistance,
                     why: "While the wheel rolls both are a share of the load.",
-                    run: "Load the standing wheel in steps, brake released: crosstalk moves the reading with the load, nothing else does.",
+                    run: runs::LOAD_STEPS,
                 },
                 Alias {
                     with: Id::ZeroDrift,
                     why: "Under a constant load a share of it is a constant.",
-                    run: "Load the standing wheel in steps, brake released: crosstalk moves the reading with the load, nothing else does.",
+                    run: runs::LOAD_STEPS,
                 },
                 Alias {
                     with: Id::LoadSensitivity,
                     why: "Both are read off how the drag goes with the load.",
-                    run: "Load the standing wheel in steps, brake released: crosstalk moves the reading with the load, nothing else does.",
+                    run: runs::LOAD_STEPS,
                 },
             ],
             smallest: "one percent of the load",

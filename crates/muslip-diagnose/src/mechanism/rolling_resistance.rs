@@ -1,5 +1,6 @@
 //! Drag on a rolling, unbraked wheel, proportional to load, absent at standstill.
 
+use super::guide::runs;
 use super::{
     Alias, Balance, Compensation, Context, Describe, Evidence, Example, Guide, Id, Kind, Law,
     Mechanism, Memory, Parameter, Reported, Sign, Stage, State,
@@ -66,12 +67,12 @@ impl Describe for RollingResistance {
                 Alias {
                     with: Id::EffectiveRadius,
                     why: "A wrong radius biases slip by a constant, which near free rolling is a constant force.",
-                    run: "Roll unbraked and then drive the wheel slightly: rolling resistance stays, a wrong radius changes its sign with slip.",
+                    run: runs::ROLL_AND_DRIVE,
                 },
                 Alias {
                     with: Id::ZeroDrift,
                     why: "Both are a force while nothing brakes.",
-                    run: "Roll unbraked and then drive the wheel slightly: rolling resistance stays, a wrong radius changes its sign with slip.",
+                    run: runs::ROLL_AND_DRIVE,
                 },
             ],
             smallest: "one percent of the load",
@@ -103,6 +104,7 @@ impl<T: Number> Mechanism<T> for RollingResistance {
             state.force[k] += coefficient * state.load[k];
             *moment = coefficient * state.load[k] * context.radius;
         }
+        // The force may act at the hub: only the growing form takes it for a moment on the wheel as well.
         if self.growing {
             state.rolling_moment = Some(moment);
         }

@@ -6,8 +6,9 @@
 use core::ops::Range;
 
 use super::{Context, Parameter, Reported};
+use crate::cleaning::stretches;
 use crate::number::Number;
-use crate::prepare::{Channel, Series};
+use crate::prepare::{Channel, GAP_STEPS, Series};
 
 /// Largest delay either way, in s.
 const MOST_S: f64 = 0.15;
@@ -17,8 +18,6 @@ const MOST_SHARE: f64 = 0.25;
 const STARTS_S: [f64; 5] = [0.0015, 0.005, 0.015, 0.04, 0.09];
 /// A start below this share of a sampling step is none.
 const LEAST_STEPS: f64 = 0.2;
-/// A step of so many typical ones is a gap, over which nothing is interpolated.
-const GAP_STEPS: f64 = 3.5;
 
 /// The delay and its bounds.
 pub fn parameters(context: &Context) -> Vec<Parameter> {
@@ -60,7 +59,7 @@ pub fn shift<T: Number>(values: &mut [T], channel: &Channel, series: &Series, de
         return;
     }
     let by = delay.value();
-    for stretch in stretches(series) {
+    for stretch in without_gap(series) {
         let mut at = stretch.start;
         for k in stretch.clone() {
             let wanted = series.time[k] + by;
@@ -98,19 +97,10 @@ fn read(
 }
 
 /// Stretches of a run without a gap in time.
-fn stretches(series: &Series) -> Vec<Range<usize>> {
-    let mut all = Vec::new();
-    let mut start = 0;
-    for k in 1..series.len() {
-        if series.dt[k] > GAP_STEPS * series.typical_dt {
-            all.push(start..k);
-            start = k;
-        }
-    }
-    if start < series.len() {
-        all.push(start..series.len());
-    }
-    all
+fn without_gap(series: &Series) -> Vec<Range<usize>> {
+    let gap = |dt: &f64| *dt > GAP_STEPS * series.typical_dt;
+    let breaks: Vec<bool> = series.dt.iter().map(gap).collect();
+    stretches(|_| true, &breaks, 1)
 }
 
 #[cfg(test)]

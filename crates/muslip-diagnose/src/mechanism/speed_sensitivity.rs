@@ -1,5 +1,6 @@
 //! Friction changes with sliding speed or vehicle speed.
 
+use super::guide::runs;
 use super::{
     Alias, Balance, Compensation, Context, Describe, Evidence, Example, Guide, Id, Kind, Law,
     Mechanism, Memory, Parameter, Reported, Sign, Stage, State,
@@ -125,17 +126,17 @@ impl Describe for SpeedSensitivity {
                 Alias {
                     with: Id::CurveShape,
                     why: "Sliding speed is slip times speed: in a campaign at one speed the two are one variable.",
-                    run: "Repeat the ramp at two speeds a factor of three apart, at one load: shape follows slip, speed sensitivity follows sliding speed.",
+                    run: runs::TWO_SPEEDS,
                 },
                 Alias {
                     with: Id::LoadSensitivity,
                     why: "Where load moves with speed (pitch, downforce), either explains what the other does.",
-                    run: "Repeat the ramp at two speeds a factor of three apart, at one load: shape follows slip, speed sensitivity follows sliding speed.",
+                    run: runs::TWO_SPEEDS,
                 },
                 Alias {
                     with: Id::WearDrift,
                     why: "Where later runs are faster or slower, use and speed go together.",
-                    run: "Repeat the ramp at two speeds a factor of three apart, at one load: shape follows slip, speed sensitivity follows sliding speed.",
+                    run: runs::TWO_SPEEDS,
                 },
             ],
             smallest: "a change of friction by 5 % over the campaign's mean speed",

@@ -1,6 +1,7 @@
 //! The load cell and its mount ring: a lightly damped second-order response.
 
 use super::filters::second_order;
+use super::guide::runs;
 use super::{
     Alias, Balance, Compensation, Context, Describe, Evidence, Example, Guide, Id, Kind, Law,
     Mechanism, Memory, Parameter, Reported, Sign, Stage, State,
@@ -64,12 +65,12 @@ impl Describe for StructuralResonance {
                 Alias {
                     with: Id::RunOut,
                     why: "At one speed a revolution is a frequency.",
-                    run: "Tap the load cell with the wheel standing, then repeat the ramp at another speed: a resonance keeps its frequency.",
+                    run: runs::TAP_STANDING,
                 },
                 Alias {
                     with: Id::InertialReaction,
                     why: "A wheel that oscillates is read as a force that does.",
-                    run: "Tap the load cell with the wheel standing, then repeat the ramp at another speed: a resonance keeps its frequency.",
+                    run: runs::TAP_STANDING,
                 },
             ],
             smallest: "a frequency that lies within the recording's band: below about 30 Hz it disturbs a ramp",

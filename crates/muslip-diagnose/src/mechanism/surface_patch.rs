@@ -1,5 +1,6 @@
 //! Friction differs over a stretch of the track.
 
+use super::guide::runs;
 use super::{
     Alias, Balance, Compensation, Context, Describe, Evidence, Example, Guide, Id, Kind, Law,
     Mechanism, Memory, Parameter, Reported, Sign, Stage, State,
@@ -147,17 +148,17 @@ impl Describe for SurfacePatch {
                 Alias {
                     with: Id::ThermalFade,
                     why: "A patch late in the run takes friction where heat does.",
-                    run: "Run the same track again, entering it ten metres later: a patch stays where it is on the track.",
+                    run: runs::TRACK_AGAIN,
                 },
                 Alias {
                     with: Id::ZeroDrift,
                     why: "Both begin somewhere along the run.",
-                    run: "Run the same track again, entering it ten metres later: a patch stays where it is on the track.",
+                    run: runs::TRACK_AGAIN,
                 },
                 Alias {
                     with: Id::SpeedSensitivity,
                     why: "A vehicle that slows down alike in every run is as fast at the patch each time.",
-                    run: "Run the same track again, entering it ten metres later: a patch stays where it is on the track.",
+                    run: runs::TRACK_AGAIN,
                 },
             ],
             smallest: "three percent of friction over a few metres",

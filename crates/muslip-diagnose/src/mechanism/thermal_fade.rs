@@ -1,5 +1,6 @@
 //! Friction changes with tread temperature, which friction power raises and time cools.
 
+use super::guide::runs;
 use super::{
     Alias, Balance, Compensation, Context, Describe, Evidence, Example, Guide, Id, Kind, Law,
     Mechanism, Memory, Parameter, Reported, Sign, Stage, State,
@@ -99,27 +100,27 @@ impl Describe for ThermalFade {
                 Alias {
                     with: Id::SpeedSensitivity,
                     why: "Sliding speed and friction power rise together within one application.",
-                    run: "Repeat the same ramp after rests of 0, 30 and 120 s: heat recovers, wear does not, speed and shape do not care.",
+                    run: runs::RESTS,
                 },
                 Alias {
                     with: Id::WearDrift,
                     why: "Both lower friction the more work was done; only heat forgets.",
-                    run: "Repeat the same ramp after rests of 0, 30 and 120 s: heat recovers, wear does not, speed and shape do not care.",
+                    run: runs::RESTS,
                 },
                 Alias {
                     with: Id::CurveShape,
                     why: "Skid comes late in an application: heat takes from the same side of the curve.",
-                    run: "Repeat the same ramp after rests of 0, 30 and 120 s: heat recovers, wear does not, speed and shape do not care.",
+                    run: runs::RESTS,
                 },
                 Alias {
                     with: Id::ZeroDrift,
                     why: "Both grow with time in a run.",
-                    run: "Repeat the same ramp after rests of 0, 30 and 120 s: heat recovers, wear does not, speed and shape do not care.",
+                    run: runs::RESTS,
                 },
                 Alias {
                     with: Id::SlipHysteresis,
                     why: "The way back from a skid is hotter than the way there, so the curve opens into a loop.",
-                    run: "Repeat the same ramp after rests of 0, 30 and 120 s: heat recovers, wear does not, speed and shape do not care.",
+                    run: runs::RESTS,
                 },
             ],
             smallest: "a time constant that is known to 5 %: friction that changes by some percent within a run",

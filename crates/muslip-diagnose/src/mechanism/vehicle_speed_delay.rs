@@ -1,5 +1,6 @@
 //! The vehicle-speed channel reports late, relative to the other channels, by a fixed time.
 
+use super::guide::runs;
 use super::speed_delay::{parameters, report, shift, starts, statement};
 use super::{
     Alias, Balance, Compensation, Context, Describe, Evidence, Example, Guide, Id, Kind, Law,
@@ -49,12 +50,12 @@ impl Describe for VehicleSpeedDelay {
                 Alias {
                     with: Id::WheelSpeedDelay,
                     why: "Slip is formed of both: one late is the other early.",
-                    run: "Tap the brake of the wheel at a held vehicle speed, then change the vehicle speed with the wheel rolling freely: each delay shows in the one that moves its own channel.",
+                    run: runs::TAP_BRAKE,
                 },
                 Alias {
                     with: Id::ForceDelay,
                     why: "Only relative timing shows: a speed late against the force is the force early.",
-                    run: "Speed up and slow down in a freely rolling wheel, brake released: a late speed shows as slip in proportion to the acceleration, a force that is late shows nothing.",
+                    run: runs::FREE_SPEEDS,
                 },
                 Alias {
                     with: Id::EffectiveRadius,

@@ -1,5 +1,6 @@
 //! Friction shifts with accumulated sliding energy or from run to run, and does not recover.
 
+use super::guide::runs;
 use super::{
     Alias, Balance, Compensation, Context, Describe, Evidence, Example, Guide, Id, Kind, Law,
     Mechanism, Memory, Parameter, Reported, Sign, Stage, State,
@@ -104,17 +105,17 @@ impl Describe for WearDrift {
                 Alias {
                     with: Id::ZeroDrift,
                     why: "Both shift from run to run; one is a factor, the other a force.",
-                    run: "Repeat the first run at the end, and read the zero with the wheel lifted before and after.",
+                    run: runs::FIRST_RUN_AGAIN,
                 },
                 Alias {
                     with: Id::SurfacePatch,
                     why: "Where each run starts further on, a place is a run.",
-                    run: "Repeat the first run at the end, and read the zero with the wheel lifted before and after.",
+                    run: runs::FIRST_RUN_AGAIN,
                 },
                 Alias {
                     with: Id::LoadSensitivity,
                     why: "Where the load changes from run to run, it goes with use.",
-                    run: "Repeat the first run at the end, and read the zero with the wheel lifted before and after.",
+                    run: runs::FIRST_RUN_AGAIN,
                 },
             ],
             smallest: "three percent of friction from the first run to the last",

@@ -1,5 +1,6 @@
 //! The wheel-speed channel reports late, relative to the other channels, by a fixed time.
 
+use super::guide::runs;
 use super::speed_delay::{parameters, report, shift, starts, statement};
 use super::{
     Alias, Balance, Compensation, Context, Describe, Evidence, Example, Guide, Id, Kind, Law,
@@ -46,22 +47,22 @@ impl Describe for WheelSpeedDelay {
                 Alias {
                     with: Id::ForceDelay,
                     why: "Only relative timing shows: a wheel speed late against the force is the force early.",
-                    run: "Speed up and slow down in a freely rolling wheel, brake released: a late speed shows as slip in proportion to the acceleration, a force that is late shows nothing.",
+                    run: runs::FREE_SPEEDS,
                 },
                 Alias {
                     with: Id::ForceLag,
                     why: "What lags behind and what comes early differ by a sign only.",
-                    run: "Speed up and slow down in a freely rolling wheel, brake released: a late speed shows as slip in proportion to the acceleration, a force that is late shows nothing.",
+                    run: runs::FREE_SPEEDS,
                 },
                 Alias {
                     with: Id::RelaxationLength,
                     why: "A slip that comes late has the opposite sign of a force that builds up late, and hides it.",
-                    run: "Repeat the same brake ramp at a third and at three times the speed: a lag of the channel keeps its time, a relaxation length keeps its distance.",
+                    run: runs::RAMP_SPEEDS,
                 },
                 Alias {
                     with: Id::BrakeLag,
                     why: "The wheel answers a torque that it seems to get earlier or later.",
-                    run: "Tap the brake of the wheel at a held vehicle speed, then change the vehicle speed with the wheel rolling freely: each delay shows in the one that moves its own channel.",
+                    run: runs::TAP_BRAKE,
                 },
             ],
             smallest: "five milliseconds; one where the wheel locks in a tenth of a second",

@@ -1,0 +1,212 @@
+//! What is named, how sure it is, and what is left unexplained.
+
+use std::collections::BTreeMap;
+
+use super::Answer;
+use crate::confidence::figures;
+use crate::decide::{Claim, Trial, stands};
+use crate::mechanism::{Id, Reported};
+use crate::omnibus::finite_or_zero;
+use crate::outcome::{Alternative, Evidence, Figure, NamedMechanism, Unexplained, sentence};
+use crate::separating::separating_test;
+
+/// Softness of the choice between two names in nats: no model of this kind is exactly true.
+const SOFTNESS: f64 = 4.0;
+/// The same as a share of what the chosen name gains.
+const SOFT_SHARE: f64 = 0.03;
+/// A delay is named where it is so many standard deviations and so many seconds from none.
+const SURE_DELAY: f64 = 5.0;
+const LEAST_DELAY_S: f64 = 1.5e-3;
+/// Largest standard deviation in s of a delay that is named.
+const VAGUE_DELAY_S: f64 = 4e-3;
+impl Answer<'_> {
+    pub(super) fn named(&self) -> Vec<NamedMechanism> {
+        let chosen = &self.decision.chosen;
+        let covariance = self.covariance(chosen);
+        chosen
+            .model
+            .terms
+            .iter()
+            .enumerate()
+            .filter_map(|(place, term)| {
+                let mechanism = self.data.catalogue.get(term.entry);
+                let id = mechanism.id();
+                let (trial, round) = self.decision.rounds.iter().find_map(|round| {
+                    round
+                        .iter()
+                        .find(|t| t.mechanism().is_some_and(|m| m.1 == term.entry))
+                        .map(|t| (t, round))
+                })?;
+                let reported = figures(self.data, &chosen.model, &covariance, place);
+                let values: Vec<Reported<f64>> = reported.iter().map(|(r, _)| r.clone()).collect();
+                let (confidence, others) = confidence(trial, round, self.data.series.len());
+                let samples: usize = self.data.series.iter().map(|s| s.len()).sum();
+                Some(NamedMechanism {
+                    id: id.as_str(),
+                    balance: id.balance().as_str(),
+                    statement: sentence(&mechanism.statement(&values, &term.parameters)),
+                    equation: mechanism.equation().to_owned(),
+                    parameters: reported
+                        .iter()
+                        .map(|(r, std)| Figure::new(r, *std))
+                        .collect(),
+                    evidence: Evidence {
+                        delta_bic: 2.0 * trial.gain,
+                        holdout_nll_gain_per_sample: finite_or_zero(
+                            trial.unseen.0 * self.data.series.len() as f64 / samples.max(1) as f64,
+                        ),
+                        confidence,
+                    },
+                    separating_test: others
+                        .first()
+                        .filter(|o| o.confidence > 0.05)
+                        .and_then(|o| Id::parse(o.id))
+                        .map_or(String::new(), |other| separating_test(id, other).to_owned()),
+                    confusable_with: others,
+                    effect_sigma: finite_or_zero(
+                        (2.0 * trial.gain.max(0.0) / samples.max(1) as f64).sqrt(),
+                    ),
+                })
+            })
+            .collect()
+    }
+
+    pub(super) fn unexplained(&self) -> Vec<Unexplained> {
+        let gained: f64 = (self.decision.base.loss - self.decision.chosen.loss).max(1e-9);
+        self.decision
+            .chosen
+            .extra
+            .iter()
+            .map(|own| {
+                let gain = self
+                    .decision
+                    .rounds
+                    .iter()
+                    .flatten()
+                    .find_map(|t| match &t.claim {
+                        Claim::Dependence(d)
+                            if d.variable == own.variable && d.balance == own.balance =>
+                        {
+                            Some(t.gain)
+                        }
+                        _ => None,
+                    })
+                    .unwrap_or(0.0);
+                Unexplained {
+                    balance: own.balance.as_str(),
+                    variable: own.variable.word(self.data),
+                    form: String::new(),
+                    z: finite_or_zero((2.0 * gain.max(0.0)).sqrt()),
+                    share: (gain / gained).clamp(0.0, 1.0),
+                }
+            })
+            .collect()
+    }
+
+    /// Delays that the base simulation's residuals show: of one speed, or of the drag where all others are early alike.
+    pub(super) fn named_delays(&self) -> Vec<NamedMechanism> {
+        let known: Vec<(&str, f64, f64)> = self
+            .timing
+            .estimates
+            .iter()
+            .copied()
+            .filter(|(_, _, std)| *std < VAGUE_DELAY_S)
+            .collect();
+        let seen = |value: f64, std: f64| {
+            value.abs() > SURE_DELAY * std.max(1e-4) && value.abs() > LEAST_DELAY_S
+        };
+        let mut all = Vec::new();
+        // Where all others are early it is the drag that is late, by what the least early of them says.
+        let speeds: Vec<&(&str, f64, f64)> = known.iter().filter(|k| k.0 != "brake").collect();
+        if !speeds.is_empty()
+            && speeds.iter().all(|(_, v, s)| *v < 0.0 && seen(*v, *s))
+            && let Some((_, value, std)) = speeds.iter().max_by(|a, b| a.1.total_cmp(&b.1))
+        {
+            all.extend(self.delay(Id::ForceDelay, -value, *std));
+        }
+        for (name, id) in [
+            ("wheel", Id::WheelSpeedDelay),
+            ("vehicle", Id::VehicleSpeedDelay),
+        ] {
+            if let Some((_, value, std)) = known
+                .iter()
+                .find(|(n, v, s)| *n == name && *v > 0.0 && seen(*v, *s))
+            {
+                all.extend(self.delay(id, *value, *std));
+            }
+        }
+        all
+    }
+
+    /// A delay as a mechanism, in that mechanism's own words.
+    fn delay(&self, id: Id, value: f64, std: f64) -> Option<NamedMechanism> {
+        let mut entries = self.data.catalogue.entries().iter();
+        let mechanism = entries.find(|m| m.id() == id)?;
+        let reported = Reported {
+            name: "delay",
+            unit: "s",
+            value,
+        };
+        let z = value.abs() / std.max(1e-5);
+        Some(NamedMechanism {
+            id: id.as_str(),
+            balance: id.balance().as_str(),
+            statement: sentence(&mechanism.statement(core::slice::from_ref(&reported), &[value])),
+            equation: mechanism.equation().to_owned(),
+            parameters: vec![Figure::new(&reported, std)],
+            evidence: Evidence {
+                delta_bic: z * z,
+                // Not measured: the timing is fitted to all runs together.
+                holdout_nll_gain_per_sample: 0.0,
+                confidence: surest(self.data.series.len()).min(0.97),
+            },
+            confusable_with: Vec::new(),
+            separating_test: String::new(),
+            effect_sigma: 0.0,
+        })
+    }
+}
+
+/// Surest that so many runs can make a name.
+fn surest(runs: usize) -> f64 {
+    1.0 - 0.5f64.powf(1.0 + 0.75 * runs as f64)
+}
+
+/// How sure a name is: against the other finalists of its round, against none, and by what so many runs can show.
+fn confidence(trial: &Trial, round: &[Trial], runs: usize) -> (f64, Vec<Alternative>) {
+    let softness = SOFTNESS + SOFT_SHARE * trial.gain.max(0.0);
+    let weight = |t: &Trial| ((t.gain - trial.gain) / softness).min(0.0).exp();
+    let mut by_id: BTreeMap<Id, f64> = BTreeMap::new();
+    let own = trial.mechanism().map(|m| m.0);
+    let mut outside = 0.0f64;
+    for other in round
+        .iter()
+        .filter(|t| stands(t) || t.mechanism().map(|m| m.0) == own)
+    {
+        match other.mechanism() {
+            Some((id, _)) => {
+                let w = by_id.entry(id).or_insert(0.0);
+                *w = w.max(weight(other));
+            }
+            None => outside = outside.max(0.5 * weight(other)),
+        }
+    }
+    let none = (-(trial.gain / softness)).exp();
+    let total = by_id.values().sum::<f64>() + none + outside;
+    let steady = 1.0 - (-0.8 * (trial.unseen.1 - 0.5)).exp();
+    let own_share = own.and_then(|id| by_id.get(&id).copied()).unwrap_or(1.0) / total;
+    let mut others: Vec<Alternative> = by_id
+        .iter()
+        .filter(|(id, _)| Some(**id) != own)
+        .map(|(id, w)| Alternative {
+            id: id.as_str(),
+            confidence: w / total,
+        })
+        .filter(|a| a.confidence > 0.01)
+        .collect();
+    others.sort_by(|a, b| b.confidence.total_cmp(&a.confidence));
+    (
+        (own_share * surest(runs) * steady).clamp(0.01, 0.99),
+        others,
+    )
+}
