@@ -57,6 +57,26 @@ impl Run {
         self.time_s.len()
     }
 
+    /// The run without the samples that are not kept.
+    #[must_use]
+    pub fn only(self, kept: &[bool]) -> Self {
+        let pick = |x: Vec<f64>| -> Vec<f64> {
+            let kept = x.into_iter().zip(kept).filter(|(_, kept)| **kept);
+            kept.map(|(x, _)| x).collect()
+        };
+        Self {
+            name: self.name,
+            time_s: pick(self.time_s),
+            wheel_speed_rad_s: pick(self.wheel_speed_rad_s),
+            vehicle_speed_m_s: pick(self.vehicle_speed_m_s),
+            drag_force_n: pick(self.drag_force_n),
+            normal_force_n: pick(self.normal_force_n),
+            brake_torque_nm: self.brake_torque_nm.map(pick),
+            brake_pressure_pa: self.brake_pressure_pa.map(pick),
+            extra: self.extra.into_iter().map(|(name, x)| (name, pick(x))).collect(),
+        }
+    }
+
     /// The run with means over so many samples each; what is missing or no number is left out of them.
     #[must_use]
     pub fn averaged(self, samples: usize) -> Self {

@@ -4,6 +4,8 @@ use std::sync::Arc;
 
 use rayon::prelude::*;
 
+use crate::chain::correct::TimingStd;
+use crate::innovations::blocks::Blocks;
 use crate::ablation::Ablation;
 use crate::campaign::{Rig, Run};
 use crate::mechanism::{Before, Context, Mechanism, catalogue};
@@ -85,6 +87,10 @@ pub struct Data {
     pub faults: Vec<DataFault>,
     /// Samples that were averaged into one beforehand, at least one.
     pub averaged: usize,
+    /// Blocks that the balances are weighed on, by run.
+    pub blocks: Vec<[Blocks; 3]>,
+    /// Standard deviations in s to which the channels' timing is known.
+    pub timing_std: TimingStd,
     /// All mechanisms.
     pub catalogue: Arc<Catalogue>,
 }
@@ -164,6 +170,8 @@ impl Data {
             extra_names: extra_names.to_vec(),
             faults: faults.concat(),
             averaged: 1,
+            blocks: Vec::new(),
+            timing_std: TimingStd::default(),
             catalogue: Arc::default(),
         }
     }

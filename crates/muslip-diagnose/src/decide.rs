@@ -6,7 +6,7 @@ use crate::data::Data;
 use crate::innovations::candidates::{Candidate, Table, table};
 use crate::innovations::dependence::{self, Dependence};
 use crate::innovations::gram::total;
-use crate::innovations::hypothesis::{Effort, Judged, capped, judge, table_grams};
+use crate::innovations::hypothesis::{Effort, Judged, capped, judge, noise_stride, table_grams};
 use crate::innovations::noise::Slopes;
 use crate::innovations::rows::rows_of;
 use crate::innovations::screen::{Score, scores};
@@ -18,12 +18,16 @@ const PRICE_OF_PARAMETER: f64 = 4.0;
 /// Price of a choice among the vocabulary in nats.
 const PRICE_OF_NAME: f64 = 3.4;
 /// Least gain in nats, all prices taken off.
-const LEAST_GAIN: f64 = 8.0;
+const LEAST_GAIN: f64 = 5.0;
 /// Least effect that is worth a name, as a share of one whitened reading's standard deviation: of the gain, half
 /// its square a reading.
 const LEAST_EFFECT: f64 = 0.07;
 /// Least t of the gains on unseen runs.
-const LEAST_T: f64 = 1.7;
+const LEAST_T: f64 = 1.5;
+/// The same of a free dependence, which says nothing of what it is.
+const LEAST_T_OF_DEPENDENCE: f64 = 3.0;
+/// Least gain of a free dependence over that of the least effect worth a name.
+const DEPENDENCE_WORTH: f64 = 3.0;
 /// A free dependence is said instead of a mechanism where it gains so many times as much, and so many nats more.
 const DEPENDENCE_SHARE: f64 = 1.1;
 const DEPENDENCE_NATS: f64 = 15.0;
@@ -195,12 +199,10 @@ fn best(table: &Table, all: &[Score], count: usize) -> Vec<(usize, Score)> {
 
 /// Effort of a finalist's judgement.
 fn effort(data: &Data) -> Effort {
-    let samples: usize = data.series.iter().map(|s| s.len()).sum();
     Effort {
         steps: 4,
-        sweeps: 2,
-        stride: (samples / 9000).max(1),
-        noise_stride: 3,
+        noise_steps: 20,
+        noise_stride: noise_stride(data),
     }
 }
 
@@ -229,7 +231,7 @@ fn round(data: &Data, so_far: &Judged, excluded: &[Id], chain_s: f64) -> Vec<Tri
         (capped(&so_far.parts), FINALISTS[0]),
         (so_far.parts.clone(), FINALISTS[1]),
     ] {
-        let sum = total(&table_grams(data, &parts, &table, effort.stride));
+        let sum = total(&table_grams(data, &parts, &table));
         let Some((_, _, all)) = scores(&table, &sum) else {
             continue;
         };
@@ -338,9 +340,14 @@ fn memory_s(data: &Data, id: Id, entry: usize, model: &Model) -> Option<f64> {
 #[must_use]
 pub fn stands(trial: &Trial) -> bool {
     let worth = 0.5 * LEAST_EFFECT * LEAST_EFFECT * trial.readings as f64;
-    trial.gain > LEAST_GAIN.max(worth)
+    let worth_it = trial.gain > worth || trial.lowered.is_some_and(|share| share > LEAST_LOWERED);
+    let free = trial.mechanism().is_none();
+    let least_t = if free { LEAST_T_OF_DEPENDENCE } else { LEAST_T };
+    let least_gain = if free { DEPENDENCE_WORTH * worth } else { LEAST_GAIN };
+    trial.gain > least_gain
+        && worth_it
         && trial.unseen.0 > 0.0
-        && trial.unseen.1 > LEAST_T
+        && trial.unseen.1 > least_t
         && trial.lowered.is_none_or(|share| share > LEAST_LOWERED)
         && trial.outlasts_chain
 }

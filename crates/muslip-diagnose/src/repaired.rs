@@ -326,6 +326,8 @@ impl Repaired {
             extra_names,
             faults: Vec::new(),
             averaged: 1,
+            blocks: Vec::new(),
+            timing_std: Default::default(),
             catalogue: Arc::default(),
         }
     }

@@ -283,6 +283,8 @@ impl<'a> Coupling<'a> {
                 extra_names: Vec::new(),
                 faults: Vec::new(),
                 averaged: 1,
+                blocks: Vec::new(),
+                timing_std: Default::default(),
                 catalogue: Arc::new(catalogue),
             },
             repaired,

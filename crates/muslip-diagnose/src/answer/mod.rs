@@ -128,11 +128,16 @@ impl Answer<'_> {
     fn assemble(self) -> Diagnosis {
         let plain = model_out::plain_law(self.rig, self.runs);
         let base_alone = self.base_alone(&plain);
-        let repaired = self.repaired(&base_alone);
         let mut mechanisms = self.named();
-        mechanisms.extend(self.named_delays());
-        let better = self.predicts_better(&base_alone, &repaired);
-        if !better {
+        let delays = self.named_delays();
+        let repaired = self.repaired(&base_alone, &delays);
+        mechanisms.extend(delays);
+        // A model that says nothing of the drag predicts it as the base does.
+        let says_something = !repaired.tyre.is_empty()
+            || !repaired.corrections.is_empty()
+            || !repaired.late.is_none();
+        let better = says_something && self.predicts_better(&base_alone, &repaired);
+        if says_something && !better {
             for named in &mut mechanisms {
                 if Id::parse(named.id).is_some_and(through_force) {
                     named.evidence.confidence = named.evidence.confidence.min(0.5);

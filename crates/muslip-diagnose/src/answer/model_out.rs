@@ -10,6 +10,7 @@ use crate::innovations::rows::rows_of;
 use crate::mechanism::{Balance, Stage};
 use crate::model::Model;
 use crate::omnibus::finite_or_zero;
+use crate::outcome::NamedMechanism;
 use crate::repaired::{
     Correction, Domain, KnownRecording, NoiseModel, Repaired, RepairedTerm, Which,
 };
@@ -88,10 +89,14 @@ impl Answer<'_> {
         Repaired::terms(&data.catalogue, &data.context, &model, &stds)
     }
 
-    /// The same with the channels at one time and with what was named.
-    pub(super) fn repaired(&self, base_alone: &Repaired) -> Repaired {
+    /// The same with the channels at one time, where they are named late, and with what else was named.
+    pub(super) fn repaired(&self, base_alone: &Repaired, delays: &[NamedMechanism]) -> Repaired {
         Repaired {
-            late: self.timing.late,
+            late: if delays.is_empty() {
+                Lateness::default()
+            } else {
+                self.timing.late
+            },
             base: self.predicting_base(),
             tyre: self.terms(true),
             corrections: self.corrections(),

@@ -103,7 +103,7 @@ impl Answer<'_> {
             .collect()
     }
 
-    /// Delays that the base simulation's residuals show: of one speed, or of the drag where all others are early alike.
+    /// Delays of the speeds that the base simulation's residuals show.
     pub(super) fn named_delays(&self) -> Vec<NamedMechanism> {
         let known: Vec<(&str, f64, f64)> = self
             .timing
@@ -116,14 +116,6 @@ impl Answer<'_> {
             value.abs() > SURE_DELAY * std.max(1e-4) && value.abs() > LEAST_DELAY_S
         };
         let mut all = Vec::new();
-        // Where all others are early it is the drag that is late, by what the least early of them says.
-        let speeds: Vec<&(&str, f64, f64)> = known.iter().filter(|k| k.0 != "brake").collect();
-        if !speeds.is_empty()
-            && speeds.iter().all(|(_, v, s)| *v < 0.0 && seen(*v, *s))
-            && let Some((_, value, std)) = speeds.iter().max_by(|a, b| a.1.total_cmp(&b.1))
-        {
-            all.extend(self.delay(Id::ForceDelay, -value, *std));
-        }
         for (name, id) in [
             ("wheel", Id::WheelSpeedDelay),
             ("vehicle", Id::VehicleSpeedDelay),

@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::campaign::Run;
+use crate::prepare::GAP_STEPS;
 
 /// By how much each channel is late against the drag channel, in s.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -17,6 +18,28 @@ pub struct Lateness {
     pub vehicle: f64,
     /// Brake torque or pressure.
     pub brake: f64,
+}
+
+/// Standard deviations in s to which the channels' timing against the drag is known.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TimingStd {
+    /// Wheel speed.
+    pub wheel: f64,
+    /// Vehicle speed.
+    pub vehicle: f64,
+    /// Brake torque or pressure.
+    pub brake: f64,
+}
+
+impl Default for TimingStd {
+    /// Of channels of which nothing is known.
+    fn default() -> Self {
+        Self {
+            wheel: 0.02,
+            vehicle: 0.05,
+            brake: 0.02,
+        }
+    }
 }
 
 /// Least share of `turn` at which the lateness by turn is still taken to grow.
@@ -37,22 +60,67 @@ impl Lateness {
     }
 
     /// The run with every channel at the drag channel's time. Where nothing was recorded yet, or any more, the
-    /// nearest reading stands.
+    /// nearest reading stands: see [`Self::known`].
     #[must_use]
     pub fn corrected(&self, run: &Run) -> Run {
         let time = &run.time_s;
         let wheel = &run.wheel_speed_rad_s;
         let brake = |x: &Vec<f64>| later(time, x, |_| self.brake);
         Run {
-            wheel_speed_rad_s: later(time, wheel, |k| {
-                let by = self.of_wheel(wheel[k]);
-                if by.is_finite() { by } else { self.wheel }
-            }),
+            wheel_speed_rad_s: later(time, wheel, |k| self.of_reading(wheel[k])),
             vehicle_speed_m_s: later(time, &run.vehicle_speed_m_s, |_| self.vehicle),
             brake_torque_nm: run.brake_torque_nm.as_ref().map(brake),
             brake_pressure_pa: run.brake_pressure_pa.as_ref().map(brake),
             ..run.clone()
         }
+    }
+
+    fn of_reading(&self, wheel_speed: f64) -> f64 {
+        let by = self.of_wheel(wheel_speed);
+        if by.is_finite() { by } else { self.wheel }
+    }
+
+    /// Samples of a run at which every channel was recorded at the drag channel's time: none in a gap or beyond the
+    /// ends, where a late channel had not yet told what happened when the recording stopped.
+    #[must_use]
+    pub fn known(&self, run: &Run) -> Vec<bool> {
+        let time = &run.time_s;
+        let n = time.len();
+        let mut steps: Vec<f64> = time.windows(2).map(|w| w[1] - w[0]).collect();
+        if steps.is_empty() {
+            return vec![true; n];
+        }
+        let longest = GAP_STEPS * crate::smooth::median_in_place(&mut steps);
+        let brake = run.brake_torque_nm.is_some() || run.brake_pressure_pa.is_some();
+        let mut at = 0;
+        (0..n)
+            .map(|k| {
+                [
+                    self.of_reading(run.wheel_speed_rad_s[k]),
+                    self.vehicle,
+                    if brake { self.brake } else { 0.0 },
+                ]
+                .into_iter()
+                .all(|by| {
+                    let wanted = time[k] + by;
+                    bracket(time, wanted, &mut at);
+                    by == 0.0
+                        || (wanted >= time[at]
+                            && wanted <= time[at + 1]
+                            && time[at + 1] - time[at] <= longest)
+                })
+            })
+            .collect()
+    }
+}
+
+/// Moves `at` to the step of time that holds `wanted`, or to the nearest.
+fn bracket(time: &[f64], wanted: f64, at: &mut usize) {
+    while *at + 2 < time.len() && time[*at + 1] <= wanted {
+        *at += 1;
+    }
+    while *at > 0 && time[*at] > wanted {
+        *at -= 1;
     }
 }
 
@@ -70,12 +138,7 @@ fn later(time: &[f64], x: &[f64], by: impl Fn(usize) -> f64) -> Vec<f64> {
                 return x[k];
             }
             let wanted = time[k] + shift;
-            while at + 2 < n && time[at + 1] <= wanted {
-                at += 1;
-            }
-            while at > 0 && time[at] > wanted {
-                at -= 1;
-            }
+            bracket(time, wanted, &mut at);
             let share = ((wanted - time[at]) / (time[at + 1] - time[at])).clamp(0.0, 1.0);
             x[at] * (1.0 - share) + x[at + 1] * share
         })
@@ -105,5 +168,25 @@ mod tests {
             assert!((corrected.wheel_speed_rad_s[k] - 50.0 - 3.0 * t).abs() < 1e-9);
             assert!((corrected.vehicle_speed_m_s[k] - 20.0 + 2.0 * t).abs() < 1e-9);
         }
+    }
+
+    #[test]
+    fn nothing_is_known_of_a_late_channel_beyond_the_ends_and_beside_a_gap() {
+        let time: Vec<f64> = (0..100)
+            .map(|k| 0.01 * f64::from(k) + if k < 50 { 0.0 } else { 2.0 })
+            .collect();
+        let run = Run {
+            wheel_speed_rad_s: vec![50.0; 100],
+            vehicle_speed_m_s: vec![20.0; 100],
+            time_s: time,
+            ..Run::default()
+        };
+        let late = Lateness {
+            vehicle: 0.035,
+            ..Lateness::default()
+        };
+        let known = late.known(&run);
+        let unknown: Vec<usize> = (0..100).filter(|k| !known[*k]).collect();
+        assert_eq!(unknown, [46, 47, 48, 49, 96, 97, 98, 99]);
     }
 }

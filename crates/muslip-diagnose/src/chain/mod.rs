@@ -1,4 +1,5 @@
 //! The measuring chain: what is known of it is taken off the recordings before any physics is asked for.
 
 pub mod correct;
+pub mod held;
 pub mod timing;

@@ -1,12 +1,14 @@
 //! Timing between the channels, from all balances at once: shifted until no derivative of a channel explains anything.
 
-use super::correct::Lateness;
+use super::correct::{Lateness, TimingStd};
+use super::held::unheld;
 use crate::ablation::Ablation;
 use crate::audit::Audit;
 use crate::campaign::{Rig, Run};
 use crate::data::Data;
+use crate::innovations::blocks::blocks;
 use crate::innovations::gram::{solve, total};
-use crate::innovations::hypothesis::{Effort, Judged, judge};
+use crate::innovations::hypothesis::{Effort, Judged, judge, noise_stride};
 use crate::model::{Model, TYRE_BASE};
 
 /// How late the channels are against the drag channel, with what is not known of it.
@@ -19,6 +21,26 @@ pub struct Timing {
 }
 
 impl Timing {
+    /// How late the drag is, in s, where all other channels are early, and alike.
+    #[must_use]
+    pub fn drag_late(&self) -> Option<f64> {
+        let known = || self.estimates.iter().filter(|(_, _, std)| *std < VAGUE_S);
+        let least = known().map(|k| -k.1).fold(f64::INFINITY, f64::min);
+        let most = known().map(|k| -k.1).fold(f64::NEG_INFINITY, f64::max);
+        (least.is_finite() && least > LEAST_DRAG_LATE_S && most - least < ALIKE * least + ALIKE_S)
+            .then_some(least)
+    }
+
+    /// Leaves the drag as late as it is against all others.
+    fn leave(&mut self, drag: f64) {
+        self.late.wheel += drag;
+        self.late.vehicle += drag;
+        self.late.brake += drag;
+        for estimate in &mut self.estimates {
+            estimate.1 += drag;
+        }
+    }
+
     /// What the timing of wheel speed and brake was off by, in s: kernels differ by about as much as they delay.
     #[must_use]
     pub fn off_by(&self) -> f64 {
@@ -38,6 +60,17 @@ const ENOUGH_SAMPLES: usize = 24_000;
 const PASSES: usize = 5;
 /// Largest shift in one pass in s.
 const MOST_SHIFT_S: f64 = 0.03;
+/// Standard deviations of the audit's lateness within which it is refined.
+const AUDIT_REACH: f64 = 2.0;
+/// By what share of the drag's lateness, and by how many seconds more, the others may differ in being early.
+const ALIKE: f64 = 0.35;
+const ALIKE_S: f64 = 1.5e-3;
+/// Least lateness of the drag in s that is left to be explained.
+const LEAST_DRAG_LATE_S: f64 = 2e-3;
+/// Largest standard deviation in s of a lateness that says anything of the drag's.
+const VAGUE_S: f64 = 4e-3;
+/// Best to which timing is ever known, in s.
+const LEAST_STD_S: f64 = 5e-4;
 /// A shift that matters no more, in s.
 const SMALL_SHIFT_S: f64 = 1e-4;
 
@@ -64,11 +97,64 @@ pub fn averaging(runs: &[Run]) -> usize {
     by_step * by_size.min(most).max(huge)
 }
 
+/// The campaign with its channels brought to the drag's time.
+fn at_one_time(rig: &Rig, runs: &[Run], averaged: usize, late: Lateness, audit: &Audit) -> Data {
+    let corrected: Vec<Run> = runs
+        .iter()
+        .map(|r| late.corrected(r).only(&late.known(r)))
+        .collect();
+    let mut data = Data::new(rig, &corrected, Ablation::default());
+    data.averaged = averaged;
+    data.blocks = blocks(&data);
+    data.timing_std = known_to(audit);
+    data
+}
+
+/// How well the audit knows the timing.
+fn known_to(audit: &Audit) -> TimingStd {
+    let nothing = TimingStd::default();
+    let std = |known: &crate::audit::Timing, nothing: f64| {
+        let own = AUDIT_REACH * known.std;
+        if own.is_finite() {
+            own.clamp(LEAST_STD_S, nothing)
+        } else {
+            nothing
+        }
+    };
+    TimingStd {
+        wheel: std(&audit.wheel_late, nothing.wheel),
+        vehicle: std(&audit.vehicle_late, nothing.vehicle),
+        brake: std(&audit.brake_late, nothing.brake),
+    }
+}
+
+/// A lateness, at most so many standard deviations from what the audit found.
+fn within(known: &crate::audit::Timing, value: f64) -> f64 {
+    let reach = AUDIT_REACH * known.std;
+    if reach.is_finite() {
+        value.clamp(known.value - reach, known.value + reach)
+    } else {
+        value
+    }
+}
+
+/// A run whose speeds are lines where they were held.
+fn without_holds(run: &Run) -> Run {
+    Run {
+        wheel_speed_rad_s: unheld(&run.time_s, &run.wheel_speed_rad_s),
+        vehicle_speed_m_s: unheld(&run.time_s, &run.vehicle_speed_m_s),
+        ..run.clone()
+    }
+}
+
 /// Brings the channels to the drag channel's time and fits the base law to them.
 #[must_use]
 pub fn timed(rig: &Rig, runs: &[Run], audit: &Audit) -> Option<(Data, Timing, Judged)> {
     let averaged = averaging(runs);
-    let runs: Vec<Run> = runs.iter().map(|r| r.clone().averaged(averaged)).collect();
+    let runs: Vec<Run> = runs
+        .iter()
+        .map(|r| without_holds(r).averaged(averaged))
+        .collect();
     let mut timing = Timing::default();
     let known = |t: &crate::audit::Timing| if t.std.is_finite() { t.value } else { 0.0 };
     timing.late.wheel = known(&audit.wheel_late);
@@ -82,17 +168,13 @@ pub fn timed(rig: &Rig, runs: &[Run], audit: &Audit) -> Option<(Data, Timing, Ju
     model.base[1] = rig.critical_slip.ln();
     let mut guess = None;
     for pass in 0..=PASSES {
-        let corrected: Vec<Run> = runs.iter().map(|r| timing.late.corrected(r)).collect();
-        let mut data = Data::new(rig, &corrected, Ablation::default());
-        data.averaged = averaged;
+        let data = at_one_time(rig, &runs, averaged, timing.late, audit);
         timing.late.turn = data.context.mean_wheel_speed;
-        let samples: usize = data.series.iter().map(|s| s.len()).sum();
         let last = pass == PASSES;
         let effort = Effort {
             steps: if pass == 0 { 5 } else { 2 },
-            sweeps: if pass == 0 || last { 3 } else { 1 },
-            stride: (samples / 9000).max(1),
-            noise_stride: 2,
+            noise_steps: if pass == 0 || last { 30 } else { 10 },
+            noise_stride: noise_stride(&data),
         };
         let judged = judge(&data, &model, &[], guess.as_deref(), effort)?;
         let (shift, std) = shifts(&judged)?;
@@ -108,6 +190,13 @@ pub fn timed(rig: &Rig, runs: &[Run], audit: &Audit) -> Option<(Data, Timing, Ju
         model = judged.model.clone();
         let small = shift.iter().all(|s| s.abs() < SMALL_SHIFT_S);
         if last || (small && pass >= 2) {
+            let Some(drag) = timing.drag_late() else {
+                return Some((data, timing, judged));
+            };
+            // The drag's own lateness is physics to be told apart: delay, lag or what else keeps it back.
+            timing.leave(drag);
+            let data = at_one_time(rig, &runs, averaged, timing.late, audit);
+            let judged = judge(&data, &model, &[], Some(&judged.parts), effort)?;
             return Some((data, timing, judged));
         }
         guess = Some(judged.parts);
@@ -122,6 +211,11 @@ pub fn timed(rig: &Rig, runs: &[Run], audit: &Audit) -> Option<(Data, Timing, Ju
         timing.late.vehicle += step(shift[1]);
         timing.late.brake += step(shift[2]);
         timing.late.wheel_by_turn += step(shift[3]);
+        // What the audit knows is not given up for what a law, still wrong, would like.
+        let by_turn = timing.late.wheel_by_turn;
+        timing.late.wheel = within(&audit.wheel_late, timing.late.wheel + by_turn) - by_turn;
+        timing.late.vehicle = within(&audit.vehicle_late, timing.late.vehicle);
+        timing.late.brake = within(&audit.brake_late, timing.late.brake);
     }
     None
 }

@@ -214,15 +214,15 @@ fn nuisances(data: &Data, slopes: &Slopes, run: usize) -> Vec<(Nuisance, Triple)
     let nuisance = |name, std| Nuisance { name, std };
     vec![
         (
-            nuisance("wheel speed late", 0.02),
+            nuisance("wheel speed late", data.timing_std.wheel),
             by_wheel(&|k| wheel_rate[k]),
         ),
         (
-            nuisance("vehicle speed late", 0.05),
+            nuisance("vehicle speed late", data.timing_std.vehicle),
             by_speed(&|k| speed_rate[k]),
         ),
         (
-            nuisance("brake late", 0.02),
+            nuisance("brake late", data.timing_std.brake),
             [
                 column(Balance::Tyre, &|_| 0.0),
                 column(Balance::Wheel, &torque),
@@ -301,7 +301,7 @@ pub fn table(
             t
         })) {
             for (b, column) in triple.into_iter().enumerate() {
-                columns[b][run].push(column);
+                columns[b][run].push(data.blocks[run][b].mean(&column));
             }
         }
     }
@@ -331,7 +331,7 @@ pub fn table(
         for (run, triples) in triples.into_iter().enumerate() {
             for triple in triples {
                 for (b, column) in triple.into_iter().enumerate() {
-                    columns[b][run].push(column);
+                    columns[b][run].push(data.blocks[run][b].mean(&column));
                 }
             }
         }
@@ -349,7 +349,7 @@ pub fn table(
         for (run, triples) in dependence.columns.iter().enumerate() {
             for triple in triples {
                 for (b, column) in triple.iter().enumerate() {
-                    columns[b][run].push(column.clone());
+                    columns[b][run].push(data.blocks[run][b].mean(column));
                 }
             }
         }

@@ -63,7 +63,7 @@ pub fn all(data: &Data, model: &Model) -> Vec<Dependence> {
             .map(|run| variable.values(data, run))
             .collect();
         for balance in [Balance::Tyre, Balance::Wheel, Balance::Vehicle] {
-            if !formed(balance) {
+            if !formed(balance) || holds_own_noise(&variable, balance) {
                 continue;
             }
             let knots = knots(data, &values, balance);
@@ -90,6 +90,16 @@ pub fn all(data: &Data, model: &Model) -> Vec<Dependence> {
         }
     }
     out
+}
+
+/// Whether a variable holds the noise of a balance's own level: a rate of the level's speed, integrated again, is
+/// that speed, noise and all, and a dependence on it would buy it away.
+fn holds_own_noise(variable: &Variable, balance: Balance) -> bool {
+    match variable {
+        Variable::SlipRate => balance != Balance::Tyre,
+        Variable::VehicleSpeedRate => balance == Balance::Vehicle,
+        _ => false,
+    }
 }
 
 /// Columns of one run: minus the lever times each hat in the tyre's row, integrated in the others.

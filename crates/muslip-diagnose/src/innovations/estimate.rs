@@ -1,36 +1,38 @@
-//! Sizes of the noise's parts by restricted maximum likelihood.
+//! Sizes of the noise's parts by restricted maximum likelihood, along its exact slopes.
 
-use super::gram::{Columns, grams, solve, total};
+use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
+
+use super::gram::{Columns, innovations, products, solve};
 use super::noise::BalanceParts;
+use super::whiten::{ByVariance, Kind, Whitener};
 use crate::data::Data;
 
 /// Prior standard deviation of a part's log size about where it starts: wide, so that a part that the data say
 /// nothing of stays plausible.
 const PRIOR: f64 = 3.0;
-/// First step along a log size.
-const STEP: f64 = 0.7;
-/// Smallest log size below the start that is tried.
-const LEAST: f64 = -7.0;
-const MOST: f64 = 7.0;
+/// Farthest a log size goes from its start.
+const FARTHEST: f64 = 7.0;
+/// The same of a walk.
+const FARTHEST_WALK: f64 = 1.5;
+/// Longest step of a log size.
+const LONGEST_STEP: f64 = 1.5;
+/// A step that gains less, in nats, is the last.
+const SMALL_GAIN: f64 = 0.05;
+/// Share of what the slope promises that a step has to gain.
+const ENOUGH: f64 = 1e-4;
 
-/// Negative restricted log likelihood of the balance under these parts, all but the first column fitted.
-#[must_use]
-pub fn loss(
-    data: &Data,
-    parts: &BalanceParts,
-    columns: &[Columns],
-    precision: &dyn Fn(usize) -> f64,
-    stride: usize,
-) -> f64 {
-    let sum = total(&grams(data, parts, columns, stride));
-    if sum.count == 0 {
-        return 0.0;
-    }
-    let chosen: Vec<usize> = (1..sum.products.nrows()).collect();
-    match solve(&sum.products, &chosen, precision) {
-        Some(solved) => 0.5 * (sum.log_variance + solved.rss + solved.log_det),
-        None => f64::INFINITY,
-    }
+/// Columns of one balance that the sizes of its noise are fitted under, and how densely they are read.
+#[derive(Clone, Copy)]
+pub struct Readings<'a> {
+    /// The campaign.
+    pub data: &'a Data,
+    /// Columns by run, the residual first; all others are fitted.
+    pub columns: &'a [Columns],
+    /// Prior precision by column.
+    pub precision: &'a dyn Fn(usize) -> f64,
+    /// Every so many samples.
+    pub stride: usize,
 }
 
 /// Minus the logarithm of the prior of the parts' sizes.
@@ -43,60 +45,248 @@ pub fn penalty(parts: &BalanceParts) -> f64 {
         .sum()
 }
 
-/// Fits the log sizes of all parts, one after the other by parabolas, `sweeps` times.
-pub fn fit(
-    data: &Data,
-    parts: &mut BalanceParts,
-    columns: &[Columns],
-    precision: &dyn Fn(usize) -> f64,
-    stride: usize,
-    sweeps: usize,
-) -> f64 {
-    let start: Vec<f64> = parts.sources.iter().map(|s| s.log_start).collect();
-    let value =
-        |parts: &BalanceParts| loss(data, parts, columns, precision, stride) + penalty(parts);
-    let mut best = value(parts);
-    let mut step = vec![STEP; start.len()];
-    for _ in 0..sweeps {
-        let before = best;
-        for i in 0..start.len() {
-            if step[i] < 0.08 {
+struct Filtered {
+    whitener: Whitener,
+    which: Vec<usize>,
+    white: Vec<Vec<f64>>,
+}
+
+/// The balance under noise of these sizes.
+struct Loss {
+    /// Negative restricted log likelihood with the prior of the sizes, in nats.
+    value: f64,
+    /// Its slopes by the log sizes.
+    slope: DVector<f64>,
+    /// Steps of the log sizes to where each part explains as much as it takes up (the multiplicative update of
+    /// variance components: Zhou, Hu, Zhou and Lange 2019, J. Comput. Graph. Stat. 28). It sees a part that is far too
+    /// small, of which the slope says nothing.
+    balance: DVector<f64>,
+}
+
+/// `None` where the columns cannot be told apart.
+fn loss(readings: &Readings<'_>, parts: &BalanceParts) -> Option<Loss> {
+    let Readings {
+        data,
+        columns,
+        precision,
+        stride,
+    } = *readings;
+    let q = columns.iter().map(Vec::len).max().unwrap_or(0);
+    let filtered: Vec<(usize, Filtered)> = (0..data.series.len())
+        .into_par_iter()
+        .filter(|run| columns[*run].first().is_some_and(|c| !c.is_empty()))
+        .map(|run| {
+            let whitener = parts.whitener(data, run, stride);
+            let (which, white) = innovations(&whitener, &columns[run]);
+            (
+                run,
+                Filtered {
+                    whitener,
+                    which,
+                    white,
+                },
+            )
+        })
+        .collect();
+    let mut sum = DMatrix::zeros(q, q);
+    let mut log_variance = 0.0;
+    for (_, f) in &filtered {
+        sum += products(q, &f.which, &f.white, 0, f.whitener.samples.len());
+        log_variance += f.whitener.log_variances.iter().sum::<f64>();
+    }
+    let fitted: Vec<usize> = (1..q).filter(|i| sum[(*i, *i)] > 0.0).collect();
+    let solved = solve(&sum, &fitted, precision)?;
+    let value = 0.5 * (log_variance + solved.rss + solved.log_det) + penalty(parts);
+    // What is left of the residual, then the directions in which the fitted columns are not known.
+    let unknown = solved.covariance.clone().cholesky()?.unpack();
+    let mut weights = DMatrix::zeros(q, 1 + fitted.len());
+    weights[(0, 0)] = 1.0;
+    for (i, &column) in fitted.iter().enumerate() {
+        weights[(column, 0)] = solved.coefficients[i];
+        for j in 0..fitted.len() {
+            weights[(column, 1 + j)] = unknown[(i, j)];
+        }
+    }
+    let shares: Vec<[DVector<f64>; 2]> = filtered
+        .par_iter()
+        .map(|(run, f)| shares(parts, *run, f, &weights))
+        .collect();
+    let n = parts.sources.len();
+    let [trace, square] = shares
+        .into_iter()
+        .fold([DVector::zeros(n), DVector::zeros(n)], |a, b| {
+            [&a[0] + &b[0], &a[1] + &b[1]]
+        });
+    let prior = |i: usize| {
+        let s = &parts.sources[i];
+        (s.log_std - s.log_start) / (PRIOR * PRIOR)
+    };
+    let loss = Loss {
+        value,
+        slope: DVector::from_fn(n, |i, _| trace[i] - square[i] + prior(i)),
+        balance: DVector::from_fn(n, |i, _| {
+            let step = 0.5 * (square[i] / trace[i]).ln();
+            if step.is_finite() {
+                step.clamp(-LONGEST_STEP, LONGEST_STEP)
+            } else {
+                0.0
+            }
+        }),
+    };
+    (value.is_finite() && loss.slope.iter().all(|x| x.is_finite())).then_some(loss)
+}
+
+/// What a run's readings say of every part: what it takes up (the trace), and what it explains.
+fn shares(
+    parts: &BalanceParts,
+    run: usize,
+    filtered: &Filtered,
+    weights: &DMatrix<f64>,
+) -> [DVector<f64>; 2] {
+    let n = filtered.whitener.samples.len();
+    let combined: Vec<Vec<f64>> = weights
+        .column_iter()
+        .map(|w| {
+            let mut sum = vec![0.0; n];
+            for (i, white) in filtered.which.iter().zip(&filtered.white) {
+                let w = w[*i];
+                if w != 0.0 {
+                    for (s, x) in sum.iter_mut().zip(white) {
+                        *s += w * x;
+                    }
+                }
+            }
+            sum
+        })
+        .collect();
+    let own = parts.parts(run);
+    let by_size = |x: &ByVariance| {
+        let mut at = 0;
+        DVector::from_iterator(
+            parts.sources.len(),
+            parts.sources.iter().map(|s| {
+                let by_variance = if s.kind.is_some() {
+                    at += 1;
+                    x.parts[at - 1]
+                } else {
+                    x.white
+                };
+                (2.0 * s.log_std).exp() * by_variance
+            }),
+        )
+    };
+    let trace = by_size(&filtered.whitener.traces(&own))
+        - by_size(&filtered.whitener.squares(&combined[1..], &own));
+    [
+        trace,
+        by_size(&filtered.whitener.squares(&combined[..1], &own)),
+    ]
+}
+
+/// Steps that balance what the parts explain before the search turns to the slopes.
+const BALANCING_STEPS: usize = 6;
+
+/// Fits the log sizes of all parts: first by balancing them, then by a quasi-Newton search (Broyden, Fletcher,
+/// Goldfarb, Shanno), in at most so many steps; the loss that is reached.
+pub fn fit(readings: &Readings<'_>, parts: &mut BalanceParts, steps: usize) -> f64 {
+    let Some(mut here) = loss(readings, parts) else {
+        return f64::INFINITY;
+    };
+    let mut inverse: Option<DMatrix<f64>> = None;
+    for step in 0..steps {
+        let balancing = step < BALANCING_STEPS;
+        let start = preconditioner(&here);
+        let direction = if balancing {
+            here.balance.clone()
+        } else {
+            -(inverse.as_ref().unwrap_or(&start) * &here.slope)
+        };
+        let Some((there, next)) = along(readings, parts, &here, direction) else {
+            if balancing || inverse.take().is_some() {
                 continue;
             }
-            let here = parts.sources[i].log_std;
-            let mut at = |x: f64| {
-                parts.sources[i].log_std = x.clamp(start[i] + LEAST, start[i] + MOST);
-                value(parts)
-            };
-            let (h, up, down) = (step[i], at(here + step[i]), at(here - step[i]));
-            let curvature = up + down - 2.0 * best;
-            let move_by = if curvature > 1e-9 {
-                (0.5 * h * (down - up) / curvature).clamp(-5.0 * h, 5.0 * h)
-            } else if up < down {
-                2.0 * h
-            } else {
-                -2.0 * h
-            };
-            let there = at(here + move_by);
-            let (value, x) = [
-                (best, here),
-                (up, here + h),
-                (down, here - h),
-                (there, here + move_by),
-            ]
-            .into_iter()
-            .fold((f64::INFINITY, here), |a, b| if b.0 < a.0 { b } else { a });
-            parts.sources[i].log_std = x.clamp(start[i] + LEAST, start[i] + MOST);
-            best = value;
-            step[i] = if (x - here).abs() < 0.3 * h {
-                0.4 * h
-            } else {
-                h
-            };
-        }
-        if before - best < 0.5 {
+            break;
+        };
+        let step = log_sizes(&there) - log_sizes(parts);
+        let change = &next.slope - &here.slope;
+        inverse = (!balancing)
+            .then(|| updated(inverse.unwrap_or(start), &step, &change))
+            .flatten();
+        let gained = here.value - next.value;
+        (*parts, here) = (there, next);
+        if gained < SMALL_GAIN {
             break;
         }
     }
-    best
+    here.value
+}
+
+fn log_sizes(parts: &BalanceParts) -> DVector<f64> {
+    DVector::from_iterator(parts.sources.len(), parts.sources.iter().map(|s| s.log_std))
+}
+
+/// Inverse curvatures that would make a slope's step the balancing one.
+fn preconditioner(here: &Loss) -> DMatrix<f64> {
+    DMatrix::from_diagonal(&here.slope.zip_map(&here.balance, |slope, step| {
+        let own = -step / slope;
+        if own.is_finite() && own > 0.0 {
+            own.clamp(1e-4, 1.0)
+        } else {
+            0.05
+        }
+    }))
+}
+
+/// The first place along a direction where the loss falls as its slope promises; `None` where there is none.
+fn along(
+    readings: &Readings<'_>,
+    parts: &BalanceParts,
+    here: &Loss,
+    mut direction: DVector<f64>,
+) -> Option<(BalanceParts, Loss)> {
+    direction *= (LONGEST_STEP / direction.amax().max(1e-12)).min(1.0);
+    let promised = direction.dot(&here.slope);
+    if !(promised < 0.0) {
+        return None;
+    }
+    let mut share = 1.0;
+    for _ in 0..5 {
+        let mut there = parts.clone();
+        for (s, by) in there.sources.iter_mut().zip(direction.iter()) {
+            // A walk is the drag's own noise, which is known.
+            let reach = if s.kind == Some(Kind::Walk) {
+                FARTHEST_WALK
+            } else {
+                FARTHEST
+            };
+            s.log_std = (s.log_std + share * by).clamp(s.log_start - reach, s.log_start + reach);
+        }
+        match loss(readings, &there) {
+            Some(next) if next.value < here.value + ENOUGH * share * promised => {
+                return Some((there, next));
+            }
+            // The lowest point of the parabola through value, slope and what was met.
+            Some(next) => {
+                let bend = next.value - here.value - share * promised;
+                share *= (-0.5 * share * promised / bend.max(1e-12)).clamp(0.1, 0.5);
+            }
+            None => share *= 0.3,
+        }
+    }
+    None
+}
+
+/// Inverse curvatures after a step and the change of the slopes over it; `None` where they do not bend upwards.
+fn updated(
+    inverse: DMatrix<f64>,
+    step: &DVector<f64>,
+    change: &DVector<f64>,
+) -> Option<DMatrix<f64>> {
+    let along = step.dot(change);
+    if along <= 1e-12 {
+        return None;
+    }
+    let n = step.len();
+    let left = DMatrix::identity(n, n) - step * change.transpose() / along;
+    Some(&left * inverse * left.transpose() + step * step.transpose() / along)
 }

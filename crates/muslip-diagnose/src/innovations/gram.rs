@@ -4,7 +4,9 @@ use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use super::noise::BalanceParts;
+use super::whiten::Whitener;
 use crate::data::Data;
+use crate::omnibus::finite_or_zero;
 
 /// Columns of one run in one balance: the residual first.
 pub type Columns = Vec<Vec<f64>>;
@@ -75,22 +77,46 @@ fn gram(
         return [Gram::empty(q), Gram::empty(q)];
     }
     let whitener = parts.whitener(data, run, stride);
-    let refs: Vec<&[f64]> = columns.iter().map(|c| c.as_slice()).collect();
-    let white = whitener.apply(&refs);
+    let (which, white) = innovations(&whitener, columns);
     let n = whitener.samples.len();
     let middle = n / 2;
-    [(0, middle), (middle, n)].map(|(from, to)| {
-        let stacked = DMatrix::from_fn(q, to - from, |i, k| {
-            let v = white[i][from + k];
-            if v.is_finite() { v } else { 0.0 }
-        });
-        let log_variance = whitener.log_variances[from..to].iter().sum();
-        Gram {
-            products: &stacked * stacked.transpose(),
-            log_variance,
-            count: to - from,
-        }
+    [(0, middle), (middle, n)].map(|(from, to)| Gram {
+        products: products(q, &which, &white, from, to),
+        log_variance: whitener.log_variances[from..to].iter().sum(),
+        count: to - from,
     })
+}
+
+/// Innovations of the columns that are not nothing, and which these are.
+#[must_use]
+pub fn innovations(whitener: &Whitener, columns: &[Vec<f64>]) -> (Vec<usize>, Vec<Vec<f64>>) {
+    let which: Vec<usize> = (0..columns.len())
+        .filter(|i| columns[*i].iter().any(|x| *x != 0.0))
+        .collect();
+    let refs: Vec<&[f64]> = which.iter().map(|i| columns[*i].as_slice()).collect();
+    (which, whitener.apply(&refs))
+}
+
+/// Inner products over some of the innovations, among `q` columns.
+#[must_use]
+pub fn products(
+    q: usize,
+    which: &[usize],
+    white: &[Vec<f64>],
+    from: usize,
+    to: usize,
+) -> DMatrix<f64> {
+    let stacked = DMatrix::from_fn(which.len(), to - from, |i, k| {
+        finite_or_zero(white[i][from + k])
+    });
+    let own = &stacked * stacked.transpose();
+    let mut all = DMatrix::zeros(q, q);
+    for (i, &a) in which.iter().enumerate() {
+        for (j, &b) in which.iter().enumerate() {
+            all[(a, b)] = own[(i, j)];
+        }
+    }
+    all
 }
 
 /// Least squares on inner products with a Gaussian prior on the coefficients.

@@ -5,12 +5,12 @@ use nalgebra::DVector;
 
 use super::candidates::{Table, table};
 use super::dependence::Dependence;
-use super::estimate;
-use super::gram::{Gram, grams, solve, total};
+use super::estimate::{self, Readings};
+use super::gram::{Gram, Solved, grams, solve, total};
 use super::noise::{BalanceParts, Slopes, parts};
-use super::rows::rows_of;
 use super::screen::precision;
 use crate::data::Data;
+use crate::mechanism::Balance;
 use crate::model::{Model, TYRE_BASE};
 
 /// A model at its best, and what it says of every run.
@@ -49,12 +49,26 @@ pub struct Judged {
 pub struct Effort {
     /// Steps towards the best parameters.
     pub steps: usize,
-    /// Sweeps over the noise's parts.
-    pub sweeps: usize,
-    /// Every so many samples.
-    pub stride: usize,
-    /// Of these every so many for the sizes of the noise.
+    /// Steps towards the best sizes of the noise.
+    pub noise_steps: usize,
+    /// Every so many blocks are read for the sizes of the noise.
     pub noise_stride: usize,
+}
+
+/// Parameters whose step would gain less, in nats, are the best.
+const SMALL_GAIN: f64 = 0.2;
+/// Blocks of one balance that are enough for the sizes of its noise.
+const ENOUGH_BLOCKS: usize = 6000;
+
+/// Every so many blocks are enough for the sizes of the noise.
+#[must_use]
+pub fn noise_stride(data: &Data) -> usize {
+    let count = |balance: usize| {
+        let blocks = data.blocks.iter().map(|b| b[balance].time.len());
+        blocks.sum::<usize>()
+    };
+    let most = (0..3).map(count).max().unwrap_or(0);
+    most.div_ceil(ENOUGH_BLOCKS).max(1)
 }
 
 fn bounds(data: &Data, model: &Model) -> Vec<(f64, f64)> {
@@ -80,7 +94,6 @@ pub fn table_grams(
     data: &Data,
     parts: &[BalanceParts],
     table: &Table,
-    stride: usize,
 ) -> Vec<[Gram; 2]> {
     let width = 1
         + table.base
@@ -92,7 +105,7 @@ pub fn table_grams(
             data,
             part,
             &table.columns[part.balance as usize],
-            stride,
+            1,
         )) {
             for (into, own) in into.iter_mut().zip(own) {
                 into.add(&own);
@@ -122,6 +135,179 @@ fn with_sizes(mut fresh: Vec<BalanceParts>, old: &[BalanceParts]) -> Vec<Balance
     fresh
 }
 
+/// A model at one place of its parameters under noise of some sizes.
+struct Place {
+    model: Model,
+    noise: Vec<BalanceParts>,
+    table: Table,
+    grams: Vec<[Gram; 2]>,
+    sum: Gram,
+    /// With all columns: where the linear model would go from here.
+    solved: Solved,
+    /// Twice the negative log likelihood here, the chain's nuisances alone fitted.
+    here: f64,
+}
+
+impl Place {
+    /// `sizes` are those of the noise; where there are none, the sensors' own. `fitted` has them fitted.
+    fn new(
+        data: &Data,
+        model: Model,
+        extra: &[Dependence],
+        sizes: Option<&[BalanceParts]>,
+        fitted: Option<Effort>,
+    ) -> Option<Self> {
+        let slopes = Slopes::new(data, &model.base);
+        let fresh = parts(data, &slopes);
+        let mut noise = match sizes {
+            Some(old) => with_sizes(fresh, old),
+            None => fresh,
+        };
+        let none = vec![crate::mechanism::Evidence::default(); data.series.len()];
+        let table = table(data, &model, &slopes, &none, extra, &[], &|_| false);
+        let prior = |i: usize| precision(&table, i);
+        if let Some(effort) = fitted {
+            for part in &mut noise {
+                let readings = Readings {
+                    data,
+                    columns: &table.columns[part.balance as usize],
+                    precision: &prior,
+                    stride: effort.noise_stride,
+                };
+                fit_from_both(&readings, part, effort.noise_steps, sizes.is_some());
+            }
+        }
+        let grams = table_grams(data, &noise, &table);
+        let sum = total(&grams);
+        let chosen: Vec<usize> = (1..sum.products.nrows()).collect();
+        let solved = solve(&sum.products, &chosen, &prior)?;
+        let here = solve(&sum.products, &nuisances(&table), &prior)?.rss + sum.log_variance;
+        Some(Self {
+            model,
+            noise,
+            table,
+            grams,
+            sum,
+            solved,
+            here,
+        })
+    }
+
+    /// Nats that the linear model would still gain.
+    fn to_gain(&self) -> f64 {
+        0.5 * (self.here - self.solved.rss - self.sum.log_variance)
+    }
+
+    /// The same place with the noise fitted to it.
+    fn refitted(self, data: &Data, extra: &[Dependence], effort: Effort) -> Option<Self> {
+        Self::new(data, self.model, extra, Some(&self.noise), Some(effort))
+    }
+
+    /// At most so many steps towards the best parameters, none uphill.
+    fn descended(self, data: &Data, extra: &[Dependence], steps: usize) -> Option<Self> {
+        let mut place = self;
+        let mut shrink = 1.0;
+        for _ in 0..steps {
+            if place.to_gain() < SMALL_GAIN {
+                break;
+            }
+            let model = place.stepped(data, shrink);
+            let next = Self::new(data, model, extra, Some(&place.noise), None)?;
+            if next.here < place.here {
+                place = next;
+                shrink = f64::min(1.0, 2.0 * shrink);
+            } else {
+                shrink *= 0.3;
+            }
+        }
+        Some(place)
+    }
+
+    fn stepped(&self, data: &Data, shrink: f64) -> Model {
+        let bounds = bounds(data, &self.model);
+        let mut p = self.model.vector();
+        for (at, index) in own_parameters(&self.model).into_iter().enumerate() {
+            let (low, high) = bounds[index];
+            let most = if index < 2 {
+                0.4
+            } else if (high - low).is_finite() {
+                0.25 * (high - low)
+            } else {
+                f64::INFINITY
+            };
+            let by = (shrink * self.solved.coefficients[at]).clamp(-most, most);
+            if by.is_finite() {
+                p[index] = (p[index] + by).clamp(low, high);
+            }
+        }
+        self.model.with(&p)
+    }
+
+    fn judged(self, extra: &[Dependence]) -> Option<Judged> {
+        let prior = |i: usize| precision(&self.table, i);
+        let n = self.sum.products.nrows();
+        let chosen: Vec<usize> = (1..n).collect();
+        // Free dependences are linear: at their best here.
+        let linear: Vec<usize> = (1 + own_parameters(&self.model).len()..n).collect();
+        let best = solve(&self.sum.products, &linear, &prior)?;
+        let mut coefficients = DVector::zeros(n - 1);
+        for (at, &i) in linear.iter().enumerate() {
+            coefficients[i - 1] = best.coefficients[at];
+        }
+        let penalty: f64 = self.noise.iter().map(estimate::penalty).sum();
+        let unseen = |own: &Gram| outside(own, &self.sum, &chosen, &prior);
+        let runs = self
+            .grams
+            .iter()
+            .map(|run| unseen(&total(core::slice::from_ref(run))));
+        let halves = self.grams.iter().flatten().map(unseen);
+        let k = own_parameters(&self.model).len();
+        Some(Judged {
+            loss: 0.5 * (self.sum.log_variance + best.rss) + penalty,
+            free: self.model.vector().len() - self.model.base.len()
+                + extra.iter().map(|e| e.knots.len()).sum::<usize>(),
+            extra: extra.to_vec(),
+            covariance: self.solved.covariance.view((0, 0), (k, k)).into_owned(),
+            nuisances: self.table.nuisances.len(),
+            prior: (0..n).map(prior).collect(),
+            left: coefficients.clone(),
+            residual_n: drag_residual(&self.table, &coefficients),
+            unseen: runs.collect::<Option<_>>()?,
+            unseen_halves: halves.collect::<Option<_>>()?,
+            model: self.model,
+            parts: self.noise,
+            grams: self.grams,
+        })
+    }
+}
+
+/// Places in the model's vector of what is fitted: the base law's two parameters and all of the terms.
+fn own_parameters(model: &Model) -> Vec<usize> {
+    let n = model.vector().len();
+    [0, 1].into_iter().chain(TYRE_BASE..n).collect()
+}
+
+/// Columns of the chain's nuisances.
+fn nuisances(table: &Table) -> Vec<usize> {
+    (1 + table.base..1 + table.base + table.nuisances.len()).collect()
+}
+
+/// Fits the sizes of a balance's noise from what they are and, where they were fitted to another model, from the
+/// sensors' own as well: what swallowed an effect before it was in the model must be let go of.
+fn fit_from_both(readings: &Readings<'_>, part: &mut BalanceParts, steps: usize, carried: bool) {
+    let mut anew = part.clone();
+    let carried_on = estimate::fit(readings, part, steps);
+    if !carried {
+        return;
+    }
+    for source in &mut anew.sources {
+        source.log_std = source.log_start;
+    }
+    if estimate::fit(readings, &mut anew, steps) < carried_on {
+        *part = anew;
+    }
+}
+
 /// Fits and judges a model from this start under a first guess of the noise.
 #[must_use]
 pub fn judge(
@@ -131,129 +317,25 @@ pub fn judge(
     guess: Option<&[BalanceParts]>,
     effort: Effort,
 ) -> Option<Judged> {
-    let mut model = start.clone();
-    let bounds = bounds(data, &model);
-    let none = vec![crate::mechanism::Evidence::default(); data.series.len()];
-    let mut parts_now: Option<Vec<BalanceParts>> = guess.map(<[BalanceParts]>::to_vec);
-    let own: Vec<usize> = [0, 1]
-        .into_iter()
-        .chain(TYRE_BASE..start.vector().len())
-        .collect();
-    let mut best: Option<(f64, Model)> = None;
-    let mut shrink = 1.0;
-    let mut step: Option<Vec<f64>> = None;
-    for pass in 0..=effort.steps {
-        let slopes = Slopes::new(data, &model.base);
-        let fresh = parts(data, &slopes);
-        let mut noise = match &parts_now {
-            Some(old) => with_sizes(fresh, old),
-            None => fresh,
-        };
-        let table = table(data, &model, &slopes, &none, extra, &[], &|_| false);
-        let prior = |i: usize| precision(&table, i);
-        let last = pass == effort.steps;
-        let mut refitted = false;
-        if last || (guess.is_none() && pass == effort.steps / 2) {
-            for part in &mut noise {
-                let columns = &table.columns[part.balance as usize];
-                let stride = effort.stride * effort.noise_stride;
-                let fit = |part: &mut BalanceParts| {
-                    estimate::fit(data, part, columns, &prior, stride, effort.sweeps)
-                };
-                // What swallowed an effect before it was in the model must be let go of: from below, too.
-                let mut small = capped(core::slice::from_ref(part)).remove(0);
-                let from_above = fit(part);
-                if guess.is_some() && fit(&mut small) < from_above {
-                    *part = small;
-                }
-            }
-            refitted = true;
-        }
-        parts_now = Some(noise.clone());
-        let grams = table_grams(data, &noise, &table, effort.stride);
-        let sum = total(&grams);
-        let chosen: Vec<usize> = (1..sum.products.nrows()).collect();
-        let solved = solve(&sum.products, &chosen, &prior)?;
-        // What the nuisances alone leave at these parameters: steps are judged by it.
-        let nuisances: Vec<usize> = (1 + table.base..sum.products.nrows()).collect();
-        let here = solve(&sum.products, &nuisances, &prior)?.rss + sum.log_variance;
-        if last {
-            let penalty: f64 = noise.iter().map(estimate::penalty).sum();
-            let unseen = |own: &Gram| outside(own, &sum, &chosen, &prior);
-            let runs = grams
-                .iter()
-                .map(|run| unseen(&total(core::slice::from_ref(run))));
-            let halves = grams.iter().flatten().map(unseen);
-            let k = own.len();
-            return Some(Judged {
-                loss: 0.5 * (sum.log_variance + solved.rss) + penalty,
-                free: start.vector().len() - start.base.len()
-                    + extra.iter().map(|e| e.knots.len()).sum::<usize>(),
-                extra: extra.to_vec(),
-                covariance: solved.covariance.view((0, 0), (k, k)).into_owned(),
-                nuisances: table.nuisances.len(),
-                prior: (0..sum.products.nrows()).map(prior).collect(),
-                left: solved.coefficients.clone(),
-                residual_n: drag_residual(data, &model),
-                unseen: runs.collect::<Option<_>>()?,
-                unseen_halves: halves.collect::<Option<_>>()?,
-                model,
-                parts: noise,
-                grams,
-            });
-        }
-        match &best {
-            Some((value, old)) if here > *value + 1e-6 && !refitted => {
-                // Too far: back, and half as far.
-                model = old.clone();
-                shrink *= 0.4;
-            }
-            _ => {
-                best = Some((here, model.clone()));
-                step = Some(
-                    solved
-                        .coefficients
-                        .iter()
-                        .take(own.len())
-                        .copied()
-                        .collect(),
-                );
-            }
-        }
-        let Some(step) = &step else { continue };
-        let mut p = model.vector();
-        for (at, &index) in own.iter().enumerate() {
-            let (low, high) = bounds[index];
-            let most = if index < 2 {
-                0.4
-            } else if (high - low).is_finite() {
-                0.25 * (high - low)
-            } else {
-                f64::INFINITY
-            };
-            let by = (shrink * step[at]).clamp(-most, most);
-            if by.is_finite() {
-                p[index] = (p[index] + by).clamp(low, high);
-            }
-        }
-        model = model.with(&p);
-    }
-    None
+    let first = (guess.is_none()).then_some(effort);
+    Place::new(data, start.clone(), extra, guess, first)?
+        .descended(data, extra, effort.steps)?
+        .refitted(data, extra, effort)?
+        .descended(data, extra, effort.steps.div_ceil(2))?
+        .judged(extra)
 }
 
-/// Root mean square of the drag's residual in N.
-fn drag_residual(data: &Data, model: &Model) -> f64 {
+/// Root mean square of what the coefficients of all columns, those of the chain included, leave of the drag, in N.
+fn drag_residual(table: &Table, coefficients: &DVector<f64>) -> f64 {
     let (mut square, mut count) = (0.0, 0.0);
-    for (run, s) in data.series.iter().enumerate() {
-        let e = rows_of(data, model, run).tyre;
-        if e.is_empty() {
+    for columns in &table.columns[Balance::Tyre as usize] {
+        let Some(residual) = columns.first() else {
             continue;
-        }
-        for k in s.tyre.iter().flat_map(Clone::clone) {
-            if e[k].is_finite() {
-                square += e[k] * e[k];
-                count += 1.0;
-            }
+        };
+        for (k, e) in residual.iter().enumerate() {
+            let fitted = columns[1..].iter().zip(coefficients.iter());
+            square += (e + fitted.map(|(x, c)| c * x[k]).sum::<f64>()).powi(2);
+            count += 1.0;
         }
     }
     (square / f64::max(count, 1.0)).sqrt()

@@ -1,5 +1,6 @@
 //! Residuals of the three balances, their covariance, and the innovations under it.
 
+pub mod blocks;
 pub mod candidates;
 pub mod dependence;
 pub mod estimate;

@@ -1,6 +1,6 @@
 //! The noise of the three balances: which parts there are, by what they enter, and how large they start.
 
-use super::whiten::{Kind, Part, Whitener};
+use super::whiten::{DIFFUSE, Kind, Part, Whitener};
 use crate::data::Data;
 use crate::mechanism::Balance;
 use crate::omnibus::finite_or_zero;
@@ -131,6 +131,12 @@ pub fn parts(data: &Data, slopes: &Slopes) -> Vec<BalanceParts> {
     let speed = sigma(&|s| s.speed.sigma).max(1e-6 * data.context.mean_speed);
     let torque = sigma(&|s| s.torque.as_ref().map_or(0.0, |t| t.sigma));
     let none: Vec<Vec<f64>> = vec![Vec::new(); s.len()];
+    let averaged = |balance: Balance, gain: &[Vec<f64>]| -> Vec<Vec<f64>> {
+        gain.iter()
+            .zip(&data.blocks)
+            .map(|(g, blocks)| blocks[balance as usize].mean(g))
+            .collect()
+    };
     let source = |name, kind, gain: &Vec<Vec<f64>>, std: f64, cap: f64| Source {
         name,
         kind,
@@ -290,6 +296,13 @@ pub fn parts(data: &Data, slopes: &Slopes) -> Vec<BalanceParts> {
                     f64::INFINITY,
                 ),
                 source(
+                    "vehicle speed, windowed",
+                    Some(Kind::Forgetting(0.02)),
+                    &none,
+                    0.3 * level,
+                    f64::INFINITY,
+                ),
+                source(
                     "force, slow",
                     Some(Kind::Integrated(0.3)),
                     &none,
@@ -320,22 +333,36 @@ pub fn parts(data: &Data, slopes: &Slopes) -> Vec<BalanceParts> {
             ],
         });
     }
+    for parts in &mut all {
+        // A mean of so many readings holds so much less of their own noise.
+        let blocks = data.blocks.iter().map(|b| &b[parts.balance as usize].samples);
+        let (count, samples) = blocks.flatten().fold((0.0, 0.0), |(count, samples), block| {
+            (count + 1.0, samples + block.len() as f64)
+        });
+        let less = 0.5 * f64::ln(f64::max(samples, 1.0) / f64::max(count, 1.0));
+        for source in &mut parts.sources {
+            source.gain = averaged(parts.balance, &source.gain);
+            if source.kind.is_none() {
+                source.log_std -= less;
+                source.log_start -= less;
+            }
+        }
+    }
     all
 }
 
 impl BalanceParts {
-    /// Gains of the filter on every `stride`-th sample of one run.
+    /// Standard deviation of the readings' own noise.
     #[must_use]
-    pub fn whitener(&self, data: &Data, run: usize, stride: usize) -> Whitener {
-        let white: f64 = self
-            .sources
-            .iter()
-            .filter(|s| s.kind.is_none())
-            .map(|s| (2.0 * s.log_std).exp())
-            .sum::<f64>()
-            .sqrt();
-        let parts: Vec<Part<'_>> = self
-            .sources
+    pub fn white(&self) -> f64 {
+        let white = self.sources.iter().find(|s| s.kind.is_none());
+        white.map_or(0.0, |s| s.log_std.exp())
+    }
+
+    /// Parts with a memory on one run, in the order of the sources.
+    #[must_use]
+    pub fn parts(&self, run: usize) -> Vec<Part<'_>> {
+        self.sources
             .iter()
             .filter_map(|s| {
                 Some(Part {
@@ -344,13 +371,21 @@ impl BalanceParts {
                     gain: &s.gain[run],
                 })
             })
-            .collect();
+            .collect()
+    }
+
+    /// Gains of the filter on every `stride`-th sample of one run.
+    #[must_use]
+    pub fn whitener(&self, data: &Data, run: usize, stride: usize) -> Whitener {
+        // Of a level nothing is known, whatever the noise is taken to be: else the likelihood would count it.
+        let start: f64 = self.sources.iter().map(|s| (2.0 * s.log_start).exp()).sum();
         Whitener::new(
-            &data.series[run].time,
-            data.series[run].segments(self.balance),
+            &data.blocks[run][self.balance as usize].time,
+            &data.blocks[run][self.balance as usize].segments,
             stride,
-            &|_| white,
-            &parts,
+            self.white(),
+            DIFFUSE * start,
+            &self.parts(run),
         )
     }
 }

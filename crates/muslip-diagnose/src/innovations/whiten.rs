@@ -14,8 +14,8 @@
 pub const MOST: usize = 12;
 /// Columns that go through the filter side by side.
 const LANES: usize = 8;
-/// Variance of a state of which nothing is known, over that of the reading.
-const DIFFUSE: f64 = 1e8;
+/// Variance of a level of which nothing is known, over that of the other parts.
+pub const DIFFUSE: f64 = 1e8;
 
 /// How one part of the noise goes in time.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -61,6 +61,17 @@ struct Step {
     inverse: f64,
     dt: f64,
     decay: u32,
+    /// Whether nothing is known of the level before this reading.
+    fresh: bool,
+}
+
+/// One number for each part's variance and for that of the readings' own noise.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct ByVariance {
+    /// By part, in their order.
+    pub parts: [f64; MOST],
+    /// Of the readings' own noise.
+    pub white: f64,
 }
 
 /// The place of this step of time among the last few: jitter makes many, a clock few.
@@ -79,13 +90,14 @@ fn same(a: f64, b: f64) -> bool {
 
 impl Whitener {
     /// Runs the filter's covariance over every `stride`-th reading of a run. `segments` are the stretches in use, `white` the
-    /// standard deviation of each reading's own noise.
+    /// standard deviation of each reading's own noise, `diffuse` the variance of a level of which nothing is known.
     #[must_use]
     pub fn new(
         time: &[f64],
         segments: &[core::ops::Range<usize>],
         stride: usize,
-        white: &dyn Fn(usize) -> f64,
+        white: f64,
+        diffuse: f64,
         parts: &[Part<'_>],
     ) -> Self {
         let m = parts.len().min(MOST);
@@ -136,7 +148,7 @@ impl Whitener {
                     }));
                     spans.len() - 1
                 });
-                let noise = white(k).powi(2);
+                let noise = white * white;
                 predict(
                     &mut p,
                     m,
@@ -147,8 +159,9 @@ impl Whitener {
                     &process,
                     parts,
                 );
-                if walk && first {
-                    forget_level(&mut p, m, noise);
+                let fresh = walk && first;
+                if fresh {
+                    forget_level(&mut p, m, diffuse);
                 }
                 first = false;
                 let row: [f64; MOST] = core::array::from_fn(|i| {
@@ -166,10 +179,122 @@ impl Whitener {
                     inverse: 1.0 / variance.sqrt(),
                     dt,
                     decay: decay as u32,
+                    fresh,
                 });
             }
         }
         out
+    }
+
+    /// Σ yᵀ V⁻¹ K V⁻¹ y over the given innovations (each over its standard deviation), K being what a unit of a
+    /// variance adds to V: minus the slope of Σ yᵀ V⁻¹ y. By one pass back through the filter (Koopman and Shephard
+    /// 1992, Biometrika 79: exact score of a model in state space). `parts` are those that the filter was made with.
+    #[must_use]
+    pub fn squares(&self, innovations: &[Vec<f64>], parts: &[Part<'_>]) -> ByVariance {
+        let mut out = ByVariance::default();
+        for group in innovations.chunks(LANES) {
+            self.add_squares(group, parts, &mut out);
+        }
+        out
+    }
+
+    /// What a unit of a part's variance adds before each reading.
+    fn driven(&self, at: usize, part: usize, kind: Kind) -> f64 {
+        let start = if at == 0 { 1.0 } else { 0.0 };
+        let step = &self.steps[at];
+        match kind {
+            Kind::Walk => step.dt,
+            Kind::Constant => start,
+            Kind::Forgetting(_) | Kind::Integrated(_) => {
+                start + 1.0 - self.decays[step.decay as usize][part].powi(2)
+            }
+        }
+    }
+
+    /// Tr V⁻¹ K, K being what a unit of a variance adds to V: the slope of log|V|, by the same pass.
+    #[must_use]
+    pub fn traces(&self, parts: &[Part<'_>]) -> ByVariance {
+        let m = self.parts;
+        let mut out = ByVariance::default();
+        let mut s = [[0.0; MOST]; MOST];
+        for (at, step) in self.steps.iter().enumerate().rev() {
+            let mut w = [0.0; MOST];
+            let mut d = step.inverse * step.inverse;
+            for i in 0..m {
+                for j in 0..m {
+                    w[i] += s[i][j] * step.gain[j];
+                }
+                d += step.gain[i] * w[i];
+            }
+            out.white += d;
+            for i in 0..m {
+                for j in 0..m {
+                    s[i][j] +=
+                        step.row[i] * step.row[j] * d - step.row[i] * w[j] - w[i] * step.row[j];
+                }
+            }
+            if step.fresh {
+                for i in 0..m {
+                    s[0][i] = 0.0;
+                    s[i][0] = 0.0;
+                }
+            }
+            for (i, part) in parts.iter().enumerate().take(m) {
+                out.parts[i] += s[i][i] * self.driven(at, i, part.kind);
+            }
+            let decay = &self.decays[step.decay as usize];
+            let along = |i: usize| if self.integrated[i] { step.dt } else { 0.0 };
+            for row in s.iter_mut().take(m) {
+                let level = row[0];
+                for j in 0..m {
+                    row[j] = row[j] * decay[j] + along(j) * level;
+                }
+            }
+            let level = s[0];
+            for i in 0..m {
+                for j in 0..m {
+                    s[i][j] = s[i][j] * decay[i] + along(i) * level[j];
+                }
+            }
+        }
+        out
+    }
+
+    fn add_squares(&self, innovations: &[Vec<f64>], parts: &[Part<'_>], out: &mut ByVariance) {
+        let m = self.parts;
+        let mut s = [[0.0; LANES]; MOST];
+        for (at, step) in self.steps.iter().enumerate().rev() {
+            let mut u = [0.0; LANES];
+            for (u, white) in u.iter_mut().zip(innovations) {
+                *u = white[at] * step.inverse;
+            }
+            for i in 0..m {
+                for l in 0..LANES {
+                    u[l] -= step.gain[i] * s[i][l];
+                }
+            }
+            out.white += u.iter().map(|u| u * u).sum::<f64>();
+            for i in 0..m {
+                for l in 0..LANES {
+                    s[i][l] += step.row[i] * u[l];
+                }
+            }
+            if step.fresh {
+                s[0] = [0.0; LANES];
+            }
+            for (i, part) in parts.iter().enumerate().take(m) {
+                let square: f64 = s[i].iter().map(|x| x * x).sum();
+                out.parts[i] += square * self.driven(at, i, part.kind);
+            }
+            let decay = &self.decays[step.decay as usize];
+            let level = s[0];
+            for i in 0..m {
+                let along = if self.integrated[i] { step.dt } else { 0.0 };
+                for l in 0..LANES {
+                    s[i][l] = s[i][l] * decay[i] + along * level[l];
+                }
+            }
+        }
     }
 
     /// Innovations of several columns, each over its own standard deviation.
@@ -257,13 +382,12 @@ fn predict(
 }
 
 /// After a gap nothing is known of the level.
-fn forget_level(p: &mut [[f64; MOST]; MOST], m: usize, noise: f64) {
+fn forget_level(p: &mut [[f64; MOST]; MOST], m: usize, diffuse: f64) {
     for j in 0..m {
         p[0][j] = 0.0;
         p[j][0] = 0.0;
     }
-    let others: f64 = (1..m).map(|i| p[i][i]).sum();
-    p[0][0] = DIFFUSE * noise.max(1e-12 * others).max(1e-30);
+    p[0][0] = diffuse;
 }
 
 fn update(
@@ -362,7 +486,7 @@ mod tests {
                         Kind::Constant => x += if first { here * part.std } else { 0.0 },
                         Kind::Walk => {
                             if starts.contains(&k) {
-                                x = here * WHITE * DIFFUSE.sqrt();
+                                x = here * (WHITE * WHITE * DIFFUSE).sqrt();
                             } else {
                                 x += here * part.std * dt.sqrt();
                             }
@@ -396,7 +520,7 @@ mod tests {
 
     fn worst_difference(parts: &[Part<'_>], time: &[f64], draw: &mut ChaCha8Rng) -> f64 {
         let segments = [2..30, 34..45, 45..80];
-        let whitener = Whitener::new(time, &segments, 1, &|_| WHITE, parts);
+        let whitener = Whitener::new(time, &segments, 1, WHITE, WHITE * WHITE * DIFFUSE, parts);
         let covariance = dense(time, &segments, parts);
         let factor = covariance.clone().cholesky().unwrap();
         let columns: Vec<Vec<f64>> = (0..11)
@@ -473,6 +597,74 @@ mod tests {
             // A variance of 1e8 leaves dense algebra itself six digits.
             let worst = worst_difference(&parts, &time, &mut draw);
             assert!(worst < 1e-5, "{worst}");
+        }
+    }
+
+    #[test]
+    fn slopes_of_the_likelihood_are_its_differences() {
+        let mut draw = ChaCha8Rng::seed_from_u64(9);
+        let (time, gain) = times(&mut draw);
+        let columns: Vec<Vec<f64>> = (0..11)
+            .map(|_| (0..80).map(|_| draw.random_range(-3.0..3.0)).collect())
+            .collect();
+        let refs: Vec<&[f64]> = columns.iter().map(Vec::as_slice).collect();
+        let segments = [2..30, 34..45, 45..80];
+        let parts = |variances: &[f64]| {
+            let kinds = [
+                Kind::Walk,
+                Kind::Forgetting(0.05),
+                Kind::Integrated(0.1),
+                Kind::Constant,
+                Kind::Integrated(0.7),
+            ];
+            let gained = [false, true, false, true, false];
+            kinds
+                .into_iter()
+                .zip(gained)
+                .zip(variances)
+                .map(|((kind, gained), variance)| Part {
+                    kind,
+                    std: variance.sqrt(),
+                    gain: if gained { &gain } else { &[] },
+                })
+                .collect::<Vec<_>>()
+        };
+        let filter = |variances: &[f64; 6]| {
+            Whitener::new(
+                &time,
+                &segments,
+                1,
+                variances[5].sqrt(),
+                1e6,
+                &parts(&variances[..5]),
+            )
+        };
+        let value = |variances: &[f64; 6]| {
+            let whitener = filter(variances);
+            let squares: f64 = whitener.apply(&refs).iter().flatten().map(|x| x * x).sum();
+            whitener.log_variances.iter().sum::<f64>() + squares
+        };
+        let here = [0.4, 0.6, 2.0, 1.2, 0.8, 0.5];
+        let whitener = filter(&here);
+        let traces = whitener.traces(&parts(&here[..5]));
+        let squares = whitener.squares(&whitener.apply(&refs), &parts(&here[..5]));
+        for i in 0..6 {
+            let own = if i == 5 {
+                traces.white - squares.white
+            } else {
+                traces.parts[i] - squares.parts[i]
+            };
+            let by = |h: f64| {
+                let mut there = here;
+                there[i] += h;
+                value(&there)
+            };
+            let h = 1e-4 * here[i];
+            let difference = (by(h) - by(-h)) / (2.0 * h);
+            assert!(
+                (own - difference).abs() < 1e-4 * difference.abs().max(1.0),
+                "{i}: {own} {difference}"
+            );
         }
     }
 }
