@@ -73,7 +73,11 @@ impl Run {
             normal_force_n: pick(self.normal_force_n),
             brake_torque_nm: self.brake_torque_nm.map(pick),
             brake_pressure_pa: self.brake_pressure_pa.map(pick),
-            extra: self.extra.into_iter().map(|(name, x)| (name, pick(x))).collect(),
+            extra: self
+                .extra
+                .into_iter()
+                .map(|(name, x)| (name, pick(x)))
+                .collect(),
         }
     }
 

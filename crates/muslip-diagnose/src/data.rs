@@ -4,10 +4,10 @@ use std::sync::Arc;
 
 use rayon::prelude::*;
 
-use crate::chain::correct::TimingStd;
-use crate::innovations::blocks::Blocks;
 use crate::ablation::Ablation;
 use crate::campaign::{Rig, Run};
+use crate::chain::correct::TimingStd;
+use crate::innovations::blocks::Blocks;
 use crate::mechanism::{Before, Context, Mechanism, catalogue};
 use crate::number::{Dual, Number};
 use crate::prepare::{DataFault, MOST_REACH, Series, prepare};

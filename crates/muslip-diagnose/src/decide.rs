@@ -6,7 +6,9 @@ use crate::data::Data;
 use crate::innovations::candidates::{Candidate, Table, table};
 use crate::innovations::dependence::{self, Dependence};
 use crate::innovations::gram::total;
-use crate::innovations::hypothesis::{Effort, Judged, capped, judge, noise_stride, table_grams};
+use crate::innovations::hypothesis::{
+    Effort, Guess, Judged, capped, judge, noise_stride, table_grams,
+};
 use crate::innovations::noise::Slopes;
 use crate::innovations::rows::rows_of;
 use crate::innovations::screen::{Score, scores};
@@ -34,7 +36,7 @@ const DEPENDENCE_NATS: f64 = 15.0;
 /// Least share by which a name that works through the force lowers the drag's residual.
 const LEAST_LOWERED: f64 = 0.02;
 /// Least memory in s that is told from a chain without any error of timing.
-const LEAST_MEMORY_S: f64 = 1.5e-3;
+const LEAST_MEMORY_S: f64 = 2.5e-3;
 /// Finalists that are judged in each round, from each of the two screens.
 const FINALISTS: [usize; 2] = [4, 1];
 /// Most names.
@@ -65,6 +67,9 @@ pub struct Trial {
     pub outlasts_chain: bool,
     /// Readings in the balances that are judged.
     pub readings: usize,
+    /// Gain in nats if the noise were no larger than the sensors make plausible: how large the effect is, whatever
+    /// the runs' own differences hide of it.
+    pub size: f64,
     /// The model with it.
     pub judged: Judged,
 }
@@ -200,7 +205,7 @@ fn best(table: &Table, all: &[Score], count: usize) -> Vec<(usize, Score)> {
 /// Effort of a finalist's judgement.
 fn effort(data: &Data) -> Effort {
     Effort {
-        steps: 4,
+        steps: 8,
         noise_steps: 20,
         noise_stride: noise_stride(data),
     }
@@ -226,7 +231,8 @@ fn round(data: &Data, so_far: &Judged, excluded: &[Id], chain_s: f64) -> Vec<Tri
         &|id| !taken(id),
     );
     let mechanisms = table.candidates.len() - free.len();
-    let mut finalists: Vec<(usize, Vec<f64>)> = Vec::new();
+    let mut finalists: Vec<(usize, Vec<f64>, f64)> = Vec::new();
+    let mut sizes: Vec<(usize, f64)> = Vec::new();
     for (parts, count) in [
         (capped(&so_far.parts), FINALISTS[0]),
         (so_far.parts.clone(), FINALISTS[1]),
@@ -235,26 +241,33 @@ fn round(data: &Data, so_far: &Judged, excluded: &[Id], chain_s: f64) -> Vec<Tri
         let Some((_, _, all)) = scores(&table, &sum) else {
             continue;
         };
+        if sizes.is_empty() {
+            sizes = all.iter().map(|s| (s.candidate, s.gain)).collect();
+        }
+        let size = |candidate: usize| {
+            let own = sizes.iter().find(|s| s.0 == candidate);
+            own.map_or(0.0, |s| s.1)
+        };
         for (index, score) in best(&table, &all, count) {
             let candidate = &table.candidates[index];
             if !finalists
                 .iter()
-                .any(|(c, _)| table.candidates[*c].entry == candidate.entry)
+                .any(|f| table.candidates[f.0].entry == candidate.entry)
             {
-                finalists.push((index, start_of(data, candidate, &score)));
+                finalists.push((index, start_of(data, candidate, &score), size(index)));
             }
         }
         // The best free dependence of either screen.
         let free = all.iter().find(|s| s.candidate >= mechanisms);
         if let Some(score) = free
-            && !finalists.iter().any(|(c, _)| *c == score.candidate)
+            && !finalists.iter().any(|f| f.0 == score.candidate)
         {
-            finalists.push((score.candidate, Vec::new()));
+            finalists.push((score.candidate, Vec::new(), size(score.candidate)));
         }
     }
     let mut trials: Vec<Trial> = finalists
         .par_iter()
-        .filter_map(|(index, start)| {
+        .filter_map(|(index, start, size)| {
             let candidate = &table.candidates[*index];
             let mut model = so_far.model.clone();
             let mut extra = so_far.extra.clone();
@@ -272,15 +285,22 @@ fn round(data: &Data, so_far: &Judged, excluded: &[Id], chain_s: f64) -> Vec<Tri
                     Claim::Dependence(free)
                 }
             };
-            let judged = judge(data, &model, &extra, Some(&so_far.parts), effort)?;
-            Some(tried(data, so_far, claim, judged, chain_s))
+            let judged = judge(data, &model, &extra, Some(Guess::beside(so_far)), effort)?;
+            Some(tried(data, so_far, claim, judged, chain_s, *size))
         })
         .collect();
     trials.sort_by(|a, b| b.gain.total_cmp(&a.gain));
     trials
 }
 
-fn tried(data: &Data, base: &Judged, claim: Claim, judged: Judged, chain_s: f64) -> Trial {
+fn tried(
+    data: &Data,
+    base: &Judged,
+    claim: Claim,
+    judged: Judged,
+    chain_s: f64,
+    size: f64,
+) -> Trial {
     let free = judged.free as f64 - base.free as f64;
     // What belongs to a run cannot be carried to another: its first half tells its second.
     let per_run = match &claim {
@@ -311,6 +331,7 @@ fn tried(data: &Data, base: &Judged, claim: Claim, judged: Judged, chain_s: f64)
         lowered,
         outlasts_chain,
         readings: readings / judged.parts.len().max(1),
+        size,
         judged,
     }
 }
@@ -340,10 +361,14 @@ fn memory_s(data: &Data, id: Id, entry: usize, model: &Model) -> Option<f64> {
 #[must_use]
 pub fn stands(trial: &Trial) -> bool {
     let worth = 0.5 * LEAST_EFFECT * LEAST_EFFECT * trial.readings as f64;
-    let worth_it = trial.gain > worth || trial.lowered.is_some_and(|share| share > LEAST_LOWERED);
+    let worth_it = trial.size.max(trial.gain) > worth;
     let free = trial.mechanism().is_none();
     let least_t = if free { LEAST_T_OF_DEPENDENCE } else { LEAST_T };
-    let least_gain = if free { DEPENDENCE_WORTH * worth } else { LEAST_GAIN };
+    let least_gain = if free {
+        DEPENDENCE_WORTH * worth
+    } else {
+        LEAST_GAIN
+    };
     trial.gain > least_gain
         && worth_it
         && trial.unseen.0 > 0.0
@@ -403,10 +428,23 @@ fn without_idle(data: &Data, mut chosen: Judged, chain_s: f64) -> Judged {
             data,
             &model,
             &chosen.extra,
-            Some(&chosen.parts),
+            Some(Guess {
+                parts: &chosen.parts,
+                added: false,
+            }),
             effort(data),
         ) {
-            Some(without) if !stands(&tried(data, &without, claim, chosen.clone(), chain_s)) => {
+            // It was large enough when it was taken up: what counts is whether the others leave anything to it.
+            Some(without)
+                if !stands(&tried(
+                    data,
+                    &without,
+                    claim,
+                    chosen.clone(),
+                    chain_s,
+                    f64::INFINITY,
+                )) =>
+            {
                 chosen = without;
             }
             _ => at += 1,

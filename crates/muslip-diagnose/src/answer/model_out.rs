@@ -15,6 +15,9 @@ use crate::repaired::{
     Correction, Domain, KnownRecording, NoiseModel, Repaired, RepairedTerm, Which,
 };
 
+/// Least mean logarithm by which a repaired model lowers the square of a prediction's error: less is chance.
+const LEAST_GAIN_OF_PREDICTION: f64 = 0.01;
+
 impl Answer<'_> {
     /// The model that says nothing beside the law fitted to the channels as recorded.
     pub(super) fn base_alone(&self, plain: &[f64]) -> Repaired {
@@ -112,36 +115,31 @@ impl Answer<'_> {
             .collect()
     }
 
-    /// Whether the repaired model predicts the drag of unseen runs no worse than the law fitted to raw channels.
+    /// Whether the repaired model predicts the drag of the recordings better than the law fitted to raw channels: on
+    /// the whole, and worse on few of them.
     pub(super) fn predicts_better(&self, base: &Repaired, with: &Repaired) -> bool {
-        let mut better = 0;
-        let mut worse = 0;
-        for (run, given) in self.runs.iter().enumerate() {
+        let chosen = &self.decision.chosen.model;
+        let per_run = chosen.terms.iter().any(|t| {
+            let entry = self.data.catalogue.get(t.entry);
+            entry.form().contains("per_run")
+        });
+        let (mut gained, mut worse) = (0.0, 0);
+        for (place, given) in self.runs.iter().enumerate() {
             let mut given = given.clone();
-            // As a run that the model has not seen.
-            given.name = format!("unseen {run}");
-            let drag = given.drag_force_n.clone();
-            let error = |model: &Repaired| -> Option<f64> {
-                let p = model.predict(&given, Which::Repaired).ok()?;
-                let e: Vec<f64> = p
-                    .drag_force_n
-                    .iter()
-                    .zip(&drag)
-                    .map(|(a, b)| (a - b).powi(2))
-                    .filter(|e| e.is_finite())
-                    .collect();
-                Some(e.iter().sum::<f64>() / e.len().max(1) as f64)
-            };
-            let (Some(a), Some(b)) = (error(base), error(with)) else {
+            if per_run {
+                // What belongs to a run is read off it anew, as on a run that the model has not seen.
+                given.name = format!("unseen {place}");
+            }
+            let (Some(a), Some(b)) = (square_error(base, &given), square_error(with, &given))
+            else {
                 return false;
             };
-            if b < a {
-                better += 1
-            } else if b > 1.002 * a {
-                worse += 1
+            gained += (a / b).ln();
+            if b > 1.002 * a {
+                worse += 1;
             }
         }
-        better > worse && worse * 4 <= self.runs.len()
+        gained > LEAST_GAIN_OF_PREDICTION * self.runs.len() as f64 && worse * 4 <= self.runs.len()
     }
 
     /// The law's two parameters that predict best beside the named terms: by plain least squares, for a prediction has
@@ -182,6 +180,18 @@ impl Answer<'_> {
         }
         model.base
     }
+}
+
+/// Mean square of the error of a predicted drag.
+fn square_error(model: &Repaired, run: &Run) -> Option<f64> {
+    let predicted = model.predict(run, Which::Repaired).ok()?.drag_force_n;
+    let errors: Vec<f64> = predicted
+        .iter()
+        .zip(&run.drag_force_n)
+        .map(|(a, b)| (a - b).powi(2))
+        .filter(|e| e.is_finite())
+        .collect();
+    Some(errors.iter().sum::<f64>() / errors.len().max(1) as f64)
 }
 
 /// The law fitted to the channels as recorded by plain least squares.

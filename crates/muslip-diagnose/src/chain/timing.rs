@@ -8,7 +8,7 @@ use crate::campaign::{Rig, Run};
 use crate::data::Data;
 use crate::innovations::blocks::blocks;
 use crate::innovations::gram::{solve, total};
-use crate::innovations::hypothesis::{Effort, Judged, judge, noise_stride};
+use crate::innovations::hypothesis::{Effort, Guess, Judged, judge, noise_stride};
 use crate::model::{Model, TYRE_BASE};
 
 /// How late the channels are against the drag channel, with what is not known of it.
@@ -41,13 +41,30 @@ impl Timing {
         }
     }
 
-    /// What the timing of wheel speed and brake was off by, in s: kernels differ by about as much as they delay.
+    /// Whether the brake's reading comes before the torque does.
+    #[must_use]
+    pub fn brake_early(&self) -> bool {
+        self.estimates.iter().any(|(name, value, std)| {
+            *name == "brake" && *std < VAGUE_S && *value < -LEAST_BRAKE_EARLY_S
+        })
+    }
+
+    /// Leaves the brake's reading as early as it is.
+    fn leave_brake(&mut self) {
+        self.late.brake = 0.0;
+        for estimate in self.estimates.iter_mut().filter(|e| e.0 == "brake") {
+            estimate.1 = 0.0;
+        }
+    }
+
+    /// What the timing of wheel speed and brake was off by, or is not known by, in s: kernels differ by about as much
+    /// as they delay, and what is shorter cannot be told from them.
     #[must_use]
     pub fn off_by(&self) -> f64 {
         self.estimates
             .iter()
             .filter(|(name, _, std)| *name != "vehicle" && *std < 0.01)
-            .map(|(_, value, _)| value.abs())
+            .map(|(_, value, std)| value.abs() + UNKNOWN_STDS * std)
             .fold(0.0, f64::max)
     }
 }
@@ -67,8 +84,12 @@ const ALIKE: f64 = 0.35;
 const ALIKE_S: f64 = 1.5e-3;
 /// Least lateness of the drag in s that is left to be explained.
 const LEAST_DRAG_LATE_S: f64 = 2e-3;
+/// Least time in s by which a brake is read before its torque that no filters of the channels account for.
+const LEAST_BRAKE_EARLY_S: f64 = 0.02;
 /// Largest standard deviation in s of a lateness that says anything of the drag's.
 const VAGUE_S: f64 = 4e-3;
+/// Standard deviations that timing may be off by without being seen.
+const UNKNOWN_STDS: f64 = 3.0;
 /// Best to which timing is ever known, in s.
 const LEAST_STD_S: f64 = 5e-4;
 /// A shift that matters no more, in s.
@@ -176,7 +197,11 @@ pub fn timed(rig: &Rig, runs: &[Run], audit: &Audit) -> Option<(Data, Timing, Ju
             noise_steps: if pass == 0 || last { 30 } else { 10 },
             noise_stride: noise_stride(&data),
         };
-        let judged = judge(&data, &model, &[], guess.as_deref(), effort)?;
+        let before = guess.as_deref().map(|parts| Guess {
+            parts,
+            added: false,
+        });
+        let judged = judge(&data, &model, &[], before, effort)?;
         let (shift, std) = shifts(&judged)?;
         timing.estimates = vec![
             (
@@ -190,13 +215,23 @@ pub fn timed(rig: &Rig, runs: &[Run], audit: &Audit) -> Option<(Data, Timing, Ju
         model = judged.model.clone();
         let small = shift.iter().all(|s| s.abs() < SMALL_SHIFT_S);
         if last || (small && pass >= 2) {
-            let Some(drag) = timing.drag_late() else {
+            // A drag later than all others, or a brake's reading before its torque, is physics to be told apart:
+            // delay, lag or what else keeps it back.
+            let drag = timing.drag_late();
+            timing.leave(drag.unwrap_or(0.0));
+            let brake = timing.brake_early();
+            if brake {
+                timing.leave_brake();
+            }
+            if drag.is_none() && !brake {
                 return Some((data, timing, judged));
-            };
-            // The drag's own lateness is physics to be told apart: delay, lag or what else keeps it back.
-            timing.leave(drag);
+            }
             let data = at_one_time(rig, &runs, averaged, timing.late, audit);
-            let judged = judge(&data, &model, &[], Some(&judged.parts), effort)?;
+            let before = Guess {
+                parts: &judged.parts,
+                added: false,
+            };
+            let judged = judge(&data, &model, &[], Some(before), effort)?;
             return Some((data, timing, judged));
         }
         guess = Some(judged.parts);

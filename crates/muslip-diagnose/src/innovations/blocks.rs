@@ -158,7 +158,11 @@ mod tests {
         assert!(blocks.samples.iter().all(|s| s.len() <= 3));
         assert_eq!(blocks.segments.len(), 2);
         let mean = blocks.mean(&time);
-        assert!(mean.iter().zip(&blocks.time).all(|(a, b)| (a - b).abs() < 1e-12));
+        assert!(
+            mean.iter()
+                .zip(&blocks.time)
+                .all(|(a, b)| (a - b).abs() < 1e-12)
+        );
     }
 
     #[test]

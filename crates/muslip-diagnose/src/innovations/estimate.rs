@@ -63,8 +63,9 @@ struct Loss {
     balance: DVector<f64>,
 }
 
-/// `None` where the columns cannot be told apart.
-fn loss(readings: &Readings<'_>, parts: &BalanceParts) -> Option<Loss> {
+/// `None` where the columns cannot be told apart, or where the value is no lower than `below`: slopes cost more than
+/// the value, and are of use only where a step is taken.
+fn loss(readings: &Readings<'_>, parts: &BalanceParts, below: f64) -> Result<Loss, Option<f64>> {
     let Readings {
         data,
         columns,
@@ -95,10 +96,13 @@ fn loss(readings: &Readings<'_>, parts: &BalanceParts) -> Option<Loss> {
         log_variance += f.whitener.log_variances.iter().sum::<f64>();
     }
     let fitted: Vec<usize> = (1..q).filter(|i| sum[(*i, *i)] > 0.0).collect();
-    let solved = solve(&sum, &fitted, precision)?;
+    let solved = solve(&sum, &fitted, precision).ok_or(None)?;
     let value = 0.5 * (log_variance + solved.rss + solved.log_det) + penalty(parts);
+    if !(value < below) {
+        return Err(value.is_finite().then_some(value));
+    }
     // What is left of the residual, then the directions in which the fitted columns are not known.
-    let unknown = solved.covariance.clone().cholesky()?.unpack();
+    let unknown = solved.covariance.clone().cholesky().ok_or(None)?.unpack();
     let mut weights = DMatrix::zeros(q, 1 + fitted.len());
     weights[(0, 0)] = 1.0;
     for (i, &column) in fitted.iter().enumerate() {
@@ -133,7 +137,8 @@ fn loss(readings: &Readings<'_>, parts: &BalanceParts) -> Option<Loss> {
             }
         }),
     };
-    (value.is_finite() && loss.slope.iter().all(|x| x.is_finite())).then_some(loss)
+    let finite = value.is_finite() && loss.slope.iter().all(|x| x.is_finite());
+    if finite { Ok(loss) } else { Err(None) }
 }
 
 /// What a run's readings say of every part: what it takes up (the trace), and what it explains.
@@ -189,7 +194,7 @@ const BALANCING_STEPS: usize = 6;
 /// Fits the log sizes of all parts: first by balancing them, then by a quasi-Newton search (Broyden, Fletcher,
 /// Goldfarb, Shanno), in at most so many steps; the loss that is reached.
 pub fn fit(readings: &Readings<'_>, parts: &mut BalanceParts, steps: usize) -> f64 {
-    let Some(mut here) = loss(readings, parts) else {
+    let Ok(mut here) = loss(readings, parts, f64::INFINITY) else {
         return f64::INFINITY;
     };
     let mut inverse: Option<DMatrix<f64>> = None;
@@ -261,16 +266,14 @@ fn along(
             };
             s.log_std = (s.log_std + share * by).clamp(s.log_start - reach, s.log_start + reach);
         }
-        match loss(readings, &there) {
-            Some(next) if next.value < here.value + ENOUGH * share * promised => {
-                return Some((there, next));
-            }
+        match loss(readings, &there, here.value + ENOUGH * share * promised) {
+            Ok(next) => return Some((there, next)),
             // The lowest point of the parabola through value, slope and what was met.
-            Some(next) => {
-                let bend = next.value - here.value - share * promised;
+            Err(Some(value)) => {
+                let bend = value - here.value - share * promised;
                 share *= (-0.5 * share * promised / bend.max(1e-12)).clamp(0.1, 0.5);
             }
-            None => share *= 0.3,
+            Err(None) => share *= 0.3,
         }
     }
     None

@@ -6,7 +6,7 @@ use nalgebra::DVector;
 use super::candidates::{Table, table};
 use super::dependence::Dependence;
 use super::estimate::{self, Readings};
-use super::gram::{Gram, Solved, grams, solve, total};
+use super::gram::{Columns, Gram, Solved, grams, solve, total};
 use super::noise::{BalanceParts, Slopes, parts};
 use super::screen::precision;
 use crate::data::Data;
@@ -90,23 +90,18 @@ fn bounds(data: &Data, model: &Model) -> Vec<(f64, f64)> {
 
 /// Inner products of all columns of a table under this noise, summed over the balances, by run and half.
 #[must_use]
-pub fn table_grams(
-    data: &Data,
-    parts: &[BalanceParts],
-    table: &Table,
-) -> Vec<[Gram; 2]> {
+pub fn table_grams(data: &Data, parts: &[BalanceParts], table: &Table) -> Vec<[Gram; 2]> {
     let width = 1
         + table.base
         + table.nuisances.len()
         + table.candidates.last().map_or(0, |c| c.columns.end);
     let mut by_run = vec![[Gram::empty(width), Gram::empty(width)]; data.series.len()];
     for part in parts {
-        for (into, own) in by_run.iter_mut().zip(grams(
-            data,
-            part,
-            &table.columns[part.balance as usize],
-            1,
-        )) {
+        for (into, own) in
+            by_run
+                .iter_mut()
+                .zip(grams(data, part, &table.columns[part.balance as usize], 1))
+        {
             for (into, own) in into.iter_mut().zip(own) {
                 into.add(&own);
             }
@@ -156,6 +151,7 @@ impl Place {
         extra: &[Dependence],
         sizes: Option<&[BalanceParts]>,
         fitted: Option<Effort>,
+        added: bool,
     ) -> Option<Self> {
         let slopes = Slopes::new(data, &model.base);
         let fresh = parts(data, &slopes);
@@ -168,9 +164,13 @@ impl Place {
         let prior = |i: usize| precision(&table, i);
         if let Some(effort) = fitted {
             for part in &mut noise {
+                let columns = &table.columns[part.balance as usize];
+                if added && !touches(columns, added_columns(&model, extra)) {
+                    continue;
+                }
                 let readings = Readings {
                     data,
-                    columns: &table.columns[part.balance as usize],
+                    columns,
                     precision: &prior,
                     stride: effort.noise_stride,
                 };
@@ -199,8 +199,21 @@ impl Place {
     }
 
     /// The same place with the noise fitted to it.
-    fn refitted(self, data: &Data, extra: &[Dependence], effort: Effort) -> Option<Self> {
-        Self::new(data, self.model, extra, Some(&self.noise), Some(effort))
+    fn refitted(
+        self,
+        data: &Data,
+        extra: &[Dependence],
+        effort: Effort,
+        added: bool,
+    ) -> Option<Self> {
+        Self::new(
+            data,
+            self.model,
+            extra,
+            Some(&self.noise),
+            Some(effort),
+            added,
+        )
     }
 
     /// At most so many steps towards the best parameters, none uphill.
@@ -212,7 +225,7 @@ impl Place {
                 break;
             }
             let model = place.stepped(data, shrink);
-            let next = Self::new(data, model, extra, Some(&place.noise), None)?;
+            let next = Self::new(data, model, extra, Some(&place.noise), None, false)?;
             if next.here < place.here {
                 place = next;
                 shrink = f64::min(1.0, 2.0 * shrink);
@@ -287,6 +300,27 @@ fn own_parameters(model: &Model) -> Vec<usize> {
     [0, 1].into_iter().chain(TYRE_BASE..n).collect()
 }
 
+/// Columns of what was added last: the last dependence's, or the last term's.
+fn added_columns(model: &Model, extra: &[Dependence]) -> core::ops::Range<usize> {
+    let terms = 1 + own_parameters(model).len();
+    let of_extra = |e: &[Dependence]| e.iter().map(|e| e.knots.len()).sum::<usize>();
+    match extra.split_last() {
+        Some((_, before)) => terms + of_extra(before)..terms + of_extra(extra),
+        None => {
+            let own = model.terms.last().map_or(0, |t| t.parameters.len());
+            terms - own..terms
+        }
+    }
+}
+
+/// Whether any of these columns is more than nothing in a balance.
+fn touches(columns: &[Columns], which: core::ops::Range<usize>) -> bool {
+    columns
+        .iter()
+        .filter(|run| run.len() >= which.end)
+        .any(|run| run[which.clone()].iter().flatten().any(|x| *x != 0.0))
+}
+
 /// Columns of the chain's nuisances.
 fn nuisances(table: &Table) -> Vec<usize> {
     (1 + table.base..1 + table.base + table.nuisances.len()).collect()
@@ -308,21 +342,50 @@ fn fit_from_both(readings: &Readings<'_>, part: &mut BalanceParts, steps: usize,
     }
 }
 
+/// A first guess of the noise.
+#[derive(Clone, Copy)]
+pub struct Guess<'a> {
+    /// As it was fitted to another model.
+    pub parts: &'a [BalanceParts],
+    /// Whether that model lacks the last term or dependence and nothing else: then the noise of a balance that this
+    /// one does not touch stays what it is.
+    pub added: bool,
+}
+
+impl<'a> Guess<'a> {
+    /// That of a model to which something is added.
+    #[must_use]
+    pub fn beside(judged: &'a Judged) -> Self {
+        Self {
+            parts: &judged.parts,
+            added: true,
+        }
+    }
+}
+
 /// Fits and judges a model from this start under a first guess of the noise.
 #[must_use]
 pub fn judge(
     data: &Data,
     start: &Model,
     extra: &[Dependence],
-    guess: Option<&[BalanceParts]>,
+    guess: Option<Guess<'_>>,
     effort: Effort,
 ) -> Option<Judged> {
     let first = (guess.is_none()).then_some(effort);
-    Place::new(data, start.clone(), extra, guess, first)?
-        .descended(data, extra, effort.steps)?
-        .refitted(data, extra, effort)?
-        .descended(data, extra, effort.steps.div_ceil(2))?
-        .judged(extra)
+    let added = guess.is_some_and(|g| g.added);
+    Place::new(
+        data,
+        start.clone(),
+        extra,
+        guess.map(|g| g.parts),
+        first,
+        false,
+    )?
+    .descended(data, extra, effort.steps)?
+    .refitted(data, extra, effort, added)?
+    .descended(data, extra, effort.steps.div_ceil(2))?
+    .judged(extra)
 }
 
 /// Root mean square of what the coefficients of all columns, those of the chain included, leave of the drag, in N.

@@ -335,10 +335,15 @@ pub fn parts(data: &Data, slopes: &Slopes) -> Vec<BalanceParts> {
     }
     for parts in &mut all {
         // A mean of so many readings holds so much less of their own noise.
-        let blocks = data.blocks.iter().map(|b| &b[parts.balance as usize].samples);
-        let (count, samples) = blocks.flatten().fold((0.0, 0.0), |(count, samples), block| {
-            (count + 1.0, samples + block.len() as f64)
-        });
+        let blocks = data
+            .blocks
+            .iter()
+            .map(|b| &b[parts.balance as usize].samples);
+        let (count, samples) = blocks
+            .flatten()
+            .fold((0.0, 0.0), |(count, samples), block| {
+                (count + 1.0, samples + block.len() as f64)
+            });
         let less = 0.5 * f64::ln(f64::max(samples, 1.0) / f64::max(count, 1.0));
         for source in &mut parts.sources {
             source.gain = averaged(parts.balance, &source.gain);
