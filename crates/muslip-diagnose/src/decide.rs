@@ -26,6 +26,9 @@ const LEAST_GAIN: f64 = 5.0;
 const LEAST_EFFECT: f64 = 0.07;
 /// Least t of the gains on unseen runs.
 const LEAST_T: f64 = 1.5;
+/// Gain of all unseen runs together, in nats, and least t, that do as well: effects need not show alike in all runs.
+const LEAST_TOGETHER: f64 = 15.0;
+const LEAST_T_TOGETHER: f64 = 1.0;
 /// The same of a free dependence, which says nothing of what it is.
 const LEAST_T_OF_DEPENDENCE: f64 = 3.0;
 /// Least gain of a free dependence over that of the least effect worth a name.
@@ -371,10 +374,17 @@ pub fn stands(trial: &Trial) -> bool {
     };
     trial.gain > least_gain
         && worth_it
-        && trial.unseen.0 > 0.0
-        && trial.unseen.1 > least_t
+        && seen_on_unseen_runs(trial, least_t)
         && trial.lowered.is_none_or(|share| share > LEAST_LOWERED)
         && trial.outlasts_chain
+}
+
+/// Whether unseen runs gain: each alike, or together so much that one run may lose.
+fn seen_on_unseen_runs(trial: &Trial, least_t: f64) -> bool {
+    let (mean, t) = trial.unseen;
+    let named = trial.mechanism().is_some();
+    let together = mean * trial.judged.unseen.len() as f64;
+    mean > 0.0 && (t > least_t || (named && together > LEAST_TOGETHER && t > LEAST_T_TOGETHER))
 }
 
 /// The trial that is taken up: a mechanism, unless a free dependence accounts for much more.

@@ -4,13 +4,16 @@ use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use super::gram::{Columns, innovations, products, solve};
-use super::noise::BalanceParts;
+use super::noise::{BalanceParts, Source};
 use super::whiten::{ByVariance, Kind, Whitener};
 use crate::data::Data;
 
 /// Prior standard deviation of a part's log size about where it starts: wide, so that a part that the data say
 /// nothing of stays plausible.
 const PRIOR: f64 = 3.0;
+/// The same of how far it lies beyond what the sensors make plausible: what belongs to a run or goes slowly could
+/// otherwise take up any effect at no cost.
+const PRIOR_BEYOND: f64 = 0.8;
 /// Farthest a log size goes from its start.
 const FARTHEST: f64 = 7.0;
 /// The same of a walk.
@@ -41,8 +44,18 @@ pub fn penalty(parts: &BalanceParts) -> f64 {
     parts
         .sources
         .iter()
-        .map(|s| 0.5 * ((s.log_std - s.log_start) / PRIOR).powi(2))
+        .map(|s| 0.5 * ((s.log_std - s.log_start) / PRIOR).powi(2) + 0.5 * beyond(s).powi(2))
         .sum()
+}
+
+/// By how many of its priors a size lies beyond what the sensors make plausible.
+fn beyond(source: &Source) -> f64 {
+    ((source.log_std - source.log_cap) / PRIOR_BEYOND).max(0.0)
+}
+
+/// Slope of [`penalty`] by the log size of one part.
+fn penalty_slope(source: &Source) -> f64 {
+    (source.log_std - source.log_start) / (PRIOR * PRIOR) + beyond(source) / PRIOR_BEYOND
 }
 
 struct Filtered {
@@ -102,7 +115,7 @@ fn loss(readings: &Readings<'_>, parts: &BalanceParts, below: f64) -> Result<Los
         return Err(value.is_finite().then_some(value));
     }
     // What is left of the residual, then the directions in which the fitted columns are not known.
-    let unknown = solved.covariance.clone().cholesky().ok_or(None)?.unpack();
+    let unknown = &solved.unknown;
     let mut weights = DMatrix::zeros(q, 1 + fitted.len());
     weights[(0, 0)] = 1.0;
     for (i, &column) in fitted.iter().enumerate() {
@@ -121,10 +134,7 @@ fn loss(readings: &Readings<'_>, parts: &BalanceParts, below: f64) -> Result<Los
         .fold([DVector::zeros(n), DVector::zeros(n)], |a, b| {
             [&a[0] + &b[0], &a[1] + &b[1]]
         });
-    let prior = |i: usize| {
-        let s = &parts.sources[i];
-        (s.log_std - s.log_start) / (PRIOR * PRIOR)
-    };
+    let prior = |i: usize| penalty_slope(&parts.sources[i]);
     let loss = Loss {
         value,
         slope: DVector::from_fn(n, |i, _| trace[i] - square[i] + prior(i)),

@@ -125,6 +125,8 @@ pub struct Solved {
     pub coefficients: DVector<f64>,
     /// Their covariance.
     pub covariance: DMatrix<f64>,
+    /// A root of it: directions in which the coefficients are not known, one a column.
+    pub unknown: DMatrix<f64>,
     /// Sum of squares that is left, prior included.
     pub rss: f64,
     /// Logarithm of the normal matrix's determinant.
@@ -155,14 +157,21 @@ pub fn solve(
     let cholesky = a.cholesky()?;
     let x = cholesky.solve(&b);
     let rss = products[(0, 0)] - b.dot(&x);
-    let inverse = cholesky.inverse();
+    let lower = cholesky.l();
+    let mut unknown = lower
+        .solve_lower_triangular(&DMatrix::identity(n, n))?
+        .transpose();
+    for (i, mut row) in unknown.row_iter_mut().enumerate() {
+        row /= scale[i];
+    }
     let log_det = 2.0
         * (0..n)
             .map(|i| cholesky.l_dirty()[(i, i)].ln() + scale[i].ln())
             .sum::<f64>();
     Some(Solved {
         coefficients: DVector::from_fn(n, |i, _| x[i] / scale[i]),
-        covariance: DMatrix::from_fn(n, n, |i, j| inverse[(i, j)] / (scale[i] * scale[j])),
+        covariance: &unknown * unknown.transpose(),
+        unknown,
         rss,
         log_det,
     })

@@ -177,10 +177,18 @@ impl Place {
                 fit_from_both(&readings, part, effort.noise_steps, sizes.is_some());
             }
         }
-        let grams = table_grams(data, &noise, &table);
-        let sum = total(&grams);
+        let mut grams = table_grams(data, &noise, &table);
+        let mut sum = total(&grams);
         let chosen: Vec<usize> = (1..sum.products.nrows()).collect();
-        let solved = solve(&sum.products, &chosen, &prior)?;
+        let mut solved = solve(&sum.products, &chosen, &prior)?;
+        if let Some(effort) = fitted
+            && at_odds(&sum, &solved)
+        {
+            fit_together(data, &table, &mut noise, &solved, effort);
+            grams = table_grams(data, &noise, &table);
+            sum = total(&grams);
+            solved = solve(&sum.products, &chosen, &prior)?;
+        }
         let here = solve(&sum.products, &nuisances(&table), &prior)?.rss + sum.log_variance;
         Some(Self {
             model,
@@ -298,6 +306,46 @@ impl Place {
 fn own_parameters(model: &Model) -> Vec<usize> {
     let n = model.vector().len();
     [0, 1].into_iter().chain(TYRE_BASE..n).collect()
+}
+
+/// Share by which the squares that all balances leave together may exceed their number.
+const AT_ODDS: f64 = 1.1;
+
+/// Whether balances, each content with its own timing and bandwidth of the channels, leave too much where they have to
+/// share it.
+fn at_odds(sum: &Gram, solved: &Solved) -> bool {
+    solved.rss > AT_ODDS * sum.count as f64
+}
+
+/// Fits the noise of every balance to what the coefficients that all share leave of it.
+fn fit_together(
+    data: &Data,
+    table: &Table,
+    noise: &mut [BalanceParts],
+    shared: &Solved,
+    effort: Effort,
+) {
+    for part in noise {
+        let mut columns = table.columns[part.balance as usize].clone();
+        for run in &mut columns {
+            let Some((residual, others)) = run.split_first_mut() else {
+                continue;
+            };
+            for (x, c) in others.iter().zip(shared.coefficients.iter()) {
+                for (e, x) in residual.iter_mut().zip(x) {
+                    *e += c * x;
+                }
+            }
+        }
+        let known = |i: usize| 1.0 / shared.covariance[(i - 1, i - 1)].max(1e-300);
+        let readings = Readings {
+            data,
+            columns: &columns,
+            precision: &known,
+            stride: effort.noise_stride,
+        };
+        estimate::fit(&readings, part, effort.noise_steps);
+    }
 }
 
 /// Columns of what was added last: the last dependence's, or the last term's.

@@ -114,8 +114,11 @@ pub fn rows<T: Listed>(
                         - force(wheel.gain_change, k) * context.radius
                 },
                 &|k| {
+                    // What the reading is off by, an encoder's ripple, is off in the level as well.
+                    let off = state.omega[k] - series.wheel.smooth[k];
+                    let off = if off.value().is_finite() { off } else { zero };
                     wheel.inertia_change * (context.inertia * series.wheel.slow[k])
-                        + context.inertia * series.wheel.raw[k]
+                        + (off + series.wheel.raw[k]) * context.inertia
                 },
             )
         }
