@@ -365,26 +365,26 @@ fn memory_s(data: &Data, id: Id, entry: usize, model: &Model) -> Option<f64> {
 pub fn stands(trial: &Trial) -> bool {
     let worth = 0.5 * LEAST_EFFECT * LEAST_EFFECT * trial.readings as f64;
     let worth_it = trial.size.max(trial.gain) > worth;
-    let free = trial.mechanism().is_none();
-    let least_t = if free { LEAST_T_OF_DEPENDENCE } else { LEAST_T };
-    let least_gain = if free {
-        DEPENDENCE_WORTH * worth
-    } else {
+    let least_gain = if trial.mechanism().is_some() {
         LEAST_GAIN
+    } else {
+        DEPENDENCE_WORTH * worth
     };
     trial.gain > least_gain
         && worth_it
-        && seen_on_unseen_runs(trial, least_t)
+        && seen_on_unseen_runs(trial)
         && trial.lowered.is_none_or(|share| share > LEAST_LOWERED)
         && trial.outlasts_chain
 }
 
-/// Whether unseen runs gain: each alike, or together so much that one run may lose.
-fn seen_on_unseen_runs(trial: &Trial, least_t: f64) -> bool {
+/// Whether unseen runs gain: each alike, or, of a mechanism, together so much that one run may lose.
+fn seen_on_unseen_runs(trial: &Trial) -> bool {
     let (mean, t) = trial.unseen;
-    let named = trial.mechanism().is_some();
+    if trial.mechanism().is_none() {
+        return mean > 0.0 && t > LEAST_T_OF_DEPENDENCE;
+    }
     let together = mean * trial.judged.unseen.len() as f64;
-    mean > 0.0 && (t > least_t || (named && together > LEAST_TOGETHER && t > LEAST_T_TOGETHER))
+    mean > 0.0 && (t > LEAST_T || (together > LEAST_TOGETHER && t > LEAST_T_TOGETHER))
 }
 
 /// The trial that is taken up: a mechanism, unless a free dependence accounts for much more.
@@ -438,10 +438,7 @@ fn without_idle(data: &Data, mut chosen: Judged, chain_s: f64) -> Judged {
             data,
             &model,
             &chosen.extra,
-            Some(Guess {
-                parts: &chosen.parts,
-                added: false,
-            }),
+            Some(Guess::of(&chosen.parts)),
             effort(data),
         ) {
             // It was large enough when it was taken up: what counts is whether the others leave anything to it.

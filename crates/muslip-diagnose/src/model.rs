@@ -27,6 +27,18 @@ pub struct Model {
 }
 
 impl Model {
+    /// The base law alone with this peak friction and critical slip, inputs as smoothed.
+    #[must_use]
+    pub fn of_law(peak: f64, critical: f64) -> Self {
+        let mut base = vec![0.0; TYRE_BASE];
+        base[0] = peak.ln();
+        base[1] = critical.ln();
+        Self {
+            base,
+            terms: Vec::new(),
+        }
+    }
+
     /// All parameters in one vector.
     #[must_use]
     pub fn vector(&self) -> Vec<f64> {

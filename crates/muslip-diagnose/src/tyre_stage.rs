@@ -6,7 +6,7 @@ use crate::data::Data;
 use crate::dynamics_stage::CrossEvidence;
 use crate::fit::{BalanceNoise, Fitted, Joint, Problem, moved};
 use crate::mechanism::{Balance, Id, Stage};
-use crate::model::{Model, TYRE_BASE, tyre};
+use crate::model::{Model, tyre};
 use crate::noise::loss;
 use crate::omnibus::{Action, Levers};
 use crate::otherwise::Otherwise;
@@ -75,13 +75,7 @@ fn joint_under<'a>(data: &'a Data, split: &'a Split, noise: &'a BalanceNoise) ->
 #[must_use]
 pub fn start(data: &Data) -> Model {
     let [peak, critical] = data.context.nominal;
-    let mut base = vec![0.0; TYRE_BASE];
-    base[0] = peak.ln();
-    base[1] = critical.ln();
-    Model {
-        base,
-        terms: Vec::new(),
-    }
+    Model::of_law(peak, critical)
 }
 
 /// Best of several starts in the slip at the peak.

@@ -17,7 +17,7 @@ use crate::decide::{Decision, decide, through_force};
 use crate::innovations::dependence::Dependence;
 use crate::innovations::hypothesis::Judged;
 use crate::mechanism::{Balance, Id};
-use crate::model::TYRE_BASE;
+use crate::model::{Model, TYRE_BASE};
 use crate::omnibus::finite_or_zero;
 use crate::outcome::{Diagnosis, Estimate, Fault, Fit, LookedFor, Recording, Role, Verdict};
 use crate::repaired::Repaired;
@@ -109,10 +109,7 @@ fn recordings(runs: &[Run]) -> Vec<Recording> {
 }
 
 fn law_of(rig: &Rig) -> Vec<f64> {
-    let mut base = vec![0.0; TYRE_BASE];
-    base[0] = rig.peak_friction.ln();
-    base[1] = rig.critical_slip.ln();
-    base
+    Model::of_law(rig.peak_friction, rig.critical_slip).base
 }
 
 struct Answer<'a> {

@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::Answer;
+use crate::audit::Timing;
 use crate::confidence::figures;
 use crate::decide::{Claim, Trial, stands};
 use crate::mechanism::{Id, Reported};
@@ -105,29 +106,19 @@ impl Answer<'_> {
 
     /// Delays of the speeds that the base simulation's residuals show.
     pub(super) fn named_delays(&self) -> Vec<NamedMechanism> {
-        let known: Vec<(&str, f64, f64)> = self
-            .timing
-            .estimates
-            .iter()
-            .copied()
-            .filter(|(_, _, std)| *std < VAGUE_DELAY_S)
-            .collect();
-        let seen = |value: f64, std: f64| {
-            value.abs() > SURE_DELAY * std.max(1e-4) && value.abs() > LEAST_DELAY_S
+        let sure = |late: &Timing| {
+            late.std < VAGUE_DELAY_S
+                && late.value > SURE_DELAY * late.std.max(1e-4)
+                && late.value > LEAST_DELAY_S
         };
-        let mut all = Vec::new();
-        for (name, id) in [
-            ("wheel", Id::WheelSpeedDelay),
-            ("vehicle", Id::VehicleSpeedDelay),
-        ] {
-            if let Some((_, value, std)) = known
-                .iter()
-                .find(|(n, v, s)| *n == name && *v > 0.0 && seen(*v, *s))
-            {
-                all.extend(self.delay(id, *value, *std));
-            }
-        }
-        all
+        [
+            (self.timing.wheel, Id::WheelSpeedDelay),
+            (self.timing.vehicle, Id::VehicleSpeedDelay),
+        ]
+        .into_iter()
+        .filter(|(late, _)| sure(late))
+        .filter_map(|(late, id)| self.delay(id, late.value, late.std))
+        .collect()
     }
 
     /// A delay as a mechanism, in that mechanism's own words.

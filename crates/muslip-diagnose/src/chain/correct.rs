@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::held::unheld;
+use super::held::without_holds;
 use crate::campaign::Run;
 use crate::prepare::GAP_STEPS;
 
@@ -60,21 +60,25 @@ impl Lateness {
         self.wheel + self.wheel_by_turn * self.turn / wheel_speed.abs().max(slowest)
     }
 
-    /// The run with every channel at the drag channel's time, and speeds that were held drawn as lines. Where nothing
-    /// was recorded yet, or any more, the nearest reading stands: see [`Self::known`].
+    /// The run with every channel at the drag channel's time, and speeds that were held drawn as lines.
     #[must_use]
     pub fn corrected(&self, run: &Run) -> Run {
         if self.is_none() {
             return run.clone();
         }
+        self.shifted(&without_holds(run))
+    }
+
+    /// The run with every channel at the drag channel's time. Where nothing was recorded yet, or any more, the nearest
+    /// reading stands: see [`Self::known`].
+    #[must_use]
+    pub fn shifted(&self, run: &Run) -> Run {
         let time = &run.time_s;
-        let wheel = unheld(time, &run.wheel_speed_rad_s);
+        let wheel = &run.wheel_speed_rad_s;
         let brake = |x: &Vec<f64>| later(time, x, |_| self.brake);
         Run {
-            wheel_speed_rad_s: later(time, &wheel, |k| self.of_reading(wheel[k])),
-            vehicle_speed_m_s: later(time, &unheld(time, &run.vehicle_speed_m_s), |_| {
-                self.vehicle
-            }),
+            wheel_speed_rad_s: later(time, wheel, |k| self.of_reading(wheel[k])),
+            vehicle_speed_m_s: later(time, &run.vehicle_speed_m_s, |_| self.vehicle),
             brake_torque_nm: run.brake_torque_nm.as_ref().map(brake),
             brake_pressure_pa: run.brake_pressure_pa.as_ref().map(brake),
             ..run.clone()

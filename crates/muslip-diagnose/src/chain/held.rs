@@ -1,12 +1,13 @@
 //! Channels that hold their last reading, drawn as straight lines between the readings.
 
+use crate::campaign::Run;
+
 /// Least share of samples that only repeat the one before in a channel that is held.
 const REPEATED: f64 = 0.4;
 
 /// A held channel with every reading at the middle of the time for which it stands, and straight lines in between:
 /// as late on average as the staircase, without its steps. Any other channel as it is.
-#[must_use]
-pub fn unheld(time: &[f64], x: &[f64]) -> Vec<f64> {
+fn unheld(time: &[f64], x: &[f64]) -> Vec<f64> {
     let moves = |k: usize| x[k] != x[k - 1];
     let n = x.len();
     // Where it moves at all: a standstill repeats without being held.
@@ -50,6 +51,16 @@ pub fn unheld(time: &[f64], x: &[f64]) -> Vec<f64> {
         }
     }
     out
+}
+
+/// A run whose speeds are lines where they were held.
+#[must_use]
+pub fn without_holds(run: &Run) -> Run {
+    Run {
+        wheel_speed_rad_s: unheld(&run.time_s, &run.wheel_speed_rad_s),
+        vehicle_speed_m_s: unheld(&run.time_s, &run.vehicle_speed_m_s),
+        ..run.clone()
+    }
 }
 
 #[cfg(test)]

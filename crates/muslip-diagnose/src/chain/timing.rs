@@ -1,32 +1,36 @@
 //! Timing between the channels, from all balances at once: shifted until no derivative of a channel explains anything.
 
 use super::correct::{Lateness, TimingStd};
-use super::held::unheld;
+use super::held::without_holds;
 use crate::ablation::Ablation;
-use crate::audit::Audit;
+use crate::audit::{Audit, Timing as Late};
 use crate::campaign::{Rig, Run};
 use crate::data::Data;
 use crate::innovations::blocks::blocks;
 use crate::innovations::gram::{solve, total};
 use crate::innovations::hypothesis::{Effort, Guess, Judged, judge, noise_stride};
-use crate::model::{Model, TYRE_BASE};
+use crate::model::Model;
 
 /// How late the channels are against the drag channel, with what is not known of it.
 #[derive(Clone, Debug, Default)]
 pub struct Timing {
     /// What is taken off.
     pub late: Lateness,
-    /// Wheel speed (at its mean), vehicle speed, brake: name, value and standard deviation in s.
-    pub estimates: Vec<(&'static str, f64, f64)>,
+    /// Of the wheel speed, at its mean.
+    pub wheel: Late,
+    /// Of the vehicle speed.
+    pub vehicle: Late,
+    /// Of the brake.
+    pub brake: Late,
 }
 
 impl Timing {
     /// How late the drag is, in s, where all other channels are early, and alike.
-    #[must_use]
-    pub fn drag_late(&self) -> Option<f64> {
-        let known = || self.estimates.iter().filter(|(_, _, std)| *std < VAGUE_S);
-        let least = known().map(|k| -k.1).fold(f64::INFINITY, f64::min);
-        let most = known().map(|k| -k.1).fold(f64::NEG_INFINITY, f64::max);
+    fn drag_late(&self) -> Option<f64> {
+        let all = [self.wheel, self.vehicle, self.brake];
+        let early = || all.iter().filter(|l| l.std < VAGUE_S).map(|l| -l.value);
+        let least = early().fold(f64::INFINITY, f64::min);
+        let most = early().fold(f64::NEG_INFINITY, f64::max);
         (least.is_finite() && least > LEAST_DRAG_LATE_S && most - least < ALIKE * least + ALIKE_S)
             .then_some(least)
     }
@@ -36,35 +40,30 @@ impl Timing {
         self.late.wheel += drag;
         self.late.vehicle += drag;
         self.late.brake += drag;
-        for estimate in &mut self.estimates {
-            estimate.1 += drag;
+        for late in [&mut self.wheel, &mut self.vehicle, &mut self.brake] {
+            late.value += drag;
         }
     }
 
     /// Whether the brake's reading comes before the torque does.
-    #[must_use]
-    pub fn brake_early(&self) -> bool {
-        self.estimates.iter().any(|(name, value, std)| {
-            *name == "brake" && *std < VAGUE_S && *value < -LEAST_BRAKE_EARLY_S
-        })
+    fn brake_early(&self) -> bool {
+        self.brake.std < VAGUE_S && self.brake.value < -LEAST_BRAKE_EARLY_S
     }
 
     /// Leaves the brake's reading as early as it is.
     fn leave_brake(&mut self) {
         self.late.brake = 0.0;
-        for estimate in self.estimates.iter_mut().filter(|e| e.0 == "brake") {
-            estimate.1 = 0.0;
-        }
+        self.brake.value = 0.0;
     }
 
     /// What the timing of wheel speed and brake was off by, or is not known by, in s: kernels differ by about as much
     /// as they delay, and what is shorter cannot be told from them.
     #[must_use]
     pub fn off_by(&self) -> f64 {
-        self.estimates
-            .iter()
-            .filter(|(name, _, std)| *name != "vehicle" && *std < 0.01)
-            .map(|(_, value, std)| value.abs() + UNKNOWN_STDS * std)
+        [self.wheel, self.brake]
+            .into_iter()
+            .filter(|late| late.std < 0.01)
+            .map(|late| late.value.abs() + UNKNOWN_STDS * late.std)
             .fold(0.0, f64::max)
     }
 }
@@ -118,11 +117,11 @@ pub fn averaging(runs: &[Run]) -> usize {
     by_step * by_size.min(most).max(huge)
 }
 
-/// The campaign with its channels brought to the drag's time.
+/// The campaign with its channels brought to the drag's time; what was held is drawn as lines already.
 fn at_one_time(rig: &Rig, runs: &[Run], averaged: usize, late: Lateness, audit: &Audit) -> Data {
     let corrected: Vec<Run> = runs
         .iter()
-        .map(|r| late.corrected(r).only(&late.known(r)))
+        .map(|r| late.shifted(r).only(&late.known(r)))
         .collect();
     let mut data = Data::new(rig, &corrected, Ablation::default());
     data.averaged = averaged;
@@ -134,7 +133,7 @@ fn at_one_time(rig: &Rig, runs: &[Run], averaged: usize, late: Lateness, audit: 
 /// How well the audit knows the timing.
 fn known_to(audit: &Audit) -> TimingStd {
     let nothing = TimingStd::default();
-    let std = |known: &crate::audit::Timing, nothing: f64| {
+    let std = |known: &Late, nothing: f64| {
         let own = AUDIT_REACH * known.std;
         if own.is_finite() {
             own.clamp(LEAST_STD_S, nothing)
@@ -150,21 +149,12 @@ fn known_to(audit: &Audit) -> TimingStd {
 }
 
 /// A lateness, at most so many standard deviations from what the audit found.
-fn within(known: &crate::audit::Timing, value: f64) -> f64 {
+fn within(known: &Late, value: f64) -> f64 {
     let reach = AUDIT_REACH * known.std;
     if reach.is_finite() {
         value.clamp(known.value - reach, known.value + reach)
     } else {
         value
-    }
-}
-
-/// A run whose speeds are lines where they were held.
-fn without_holds(run: &Run) -> Run {
-    Run {
-        wheel_speed_rad_s: unheld(&run.time_s, &run.wheel_speed_rad_s),
-        vehicle_speed_m_s: unheld(&run.time_s, &run.vehicle_speed_m_s),
-        ..run.clone()
     }
 }
 
@@ -177,16 +167,11 @@ pub fn timed(rig: &Rig, runs: &[Run], audit: &Audit) -> Option<(Data, Timing, Ju
         .map(|r| without_holds(r).averaged(averaged))
         .collect();
     let mut timing = Timing::default();
-    let known = |t: &crate::audit::Timing| if t.std.is_finite() { t.value } else { 0.0 };
+    let known = |t: &Late| if t.std.is_finite() { t.value } else { 0.0 };
     timing.late.wheel = known(&audit.wheel_late);
     timing.late.vehicle = known(&audit.vehicle_late);
     timing.late.brake = known(&audit.brake_late);
-    let mut model = Model {
-        base: vec![0.0; TYRE_BASE],
-        terms: Vec::new(),
-    };
-    model.base[0] = rig.peak_friction.ln();
-    model.base[1] = rig.critical_slip.ln();
+    let mut model = Model::of_law(rig.peak_friction, rig.critical_slip);
     let mut guess = None;
     for pass in 0..=PASSES {
         let data = at_one_time(rig, &runs, averaged, timing.late, audit);
@@ -197,21 +182,27 @@ pub fn timed(rig: &Rig, runs: &[Run], audit: &Audit) -> Option<(Data, Timing, Ju
             noise_steps: if pass == 0 || last { 30 } else { 10 },
             noise_stride: noise_stride(&data),
         };
-        let before = guess.as_deref().map(|parts| Guess {
-            parts,
-            added: false,
-        });
+        let before = guess.as_deref().map(Guess::of);
         let judged = judge(&data, &model, &[], before, effort)?;
         let (shift, std) = shifts(&judged)?;
-        timing.estimates = vec![
-            (
-                "wheel",
-                timing.late.wheel + timing.late.wheel_by_turn + shift[0] + shift[3],
-                std[0],
-            ),
-            ("vehicle", timing.late.vehicle + shift[1], std[1]),
-            ("brake", timing.late.brake + shift[2], std[2]),
+        let late = &timing.late;
+        let [wheel, vehicle, brake] = [
+            late.wheel + late.wheel_by_turn + shift[0] + shift[3],
+            late.vehicle + shift[1],
+            late.brake + shift[2],
         ];
+        timing.wheel = Late {
+            value: wheel,
+            std: std[0],
+        };
+        timing.vehicle = Late {
+            value: vehicle,
+            std: std[1],
+        };
+        timing.brake = Late {
+            value: brake,
+            std: std[2],
+        };
         model = judged.model.clone();
         let small = shift.iter().all(|s| s.abs() < SMALL_SHIFT_S);
         if last || (small && pass >= 2) {
@@ -227,11 +218,8 @@ pub fn timed(rig: &Rig, runs: &[Run], audit: &Audit) -> Option<(Data, Timing, Ju
                 return Some((data, timing, judged));
             }
             let data = at_one_time(rig, &runs, averaged, timing.late, audit);
-            let before = Guess {
-                parts: &judged.parts,
-                added: false,
-            };
-            let judged = judge(&data, &model, &[], Some(before), effort)?;
+            let before = Some(Guess::of(&judged.parts));
+            let judged = judge(&data, &model, &[], before, effort)?;
             return Some((data, timing, judged));
         }
         guess = Some(judged.parts);

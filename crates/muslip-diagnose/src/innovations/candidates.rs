@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use super::dependence::Dependence;
+use super::dependence::{Dependence, width};
 use super::gram::Columns;
 use super::noise::Slopes;
 use super::rows::{Rows, rows, rows_of};
@@ -364,7 +364,7 @@ pub fn table(
     }
     Table {
         columns,
-        base: fixed.len() + extra.iter().map(|e| e.knots.len()).sum::<usize>(),
+        base: fixed.len() + width(extra),
         nuisances: listed,
         candidates,
     }

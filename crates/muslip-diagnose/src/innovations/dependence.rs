@@ -31,6 +31,12 @@ pub struct Dependence {
     pub columns: Vec<Vec<Triple>>,
 }
 
+/// Columns of these dependences together.
+#[must_use]
+pub fn width(all: &[Dependence]) -> usize {
+    all.iter().map(|own| own.knots.len()).sum()
+}
+
 /// Knots between the variable's extremes, half by quantile, half evenly: what is rare still matters.
 fn knots(data: &Data, values: &[Vec<f64>], balance: Balance) -> Vec<f64> {
     let mut all: Vec<f64> = Vec::new();

@@ -4,7 +4,7 @@
 use nalgebra::DVector;
 
 use super::candidates::{Table, table};
-use super::dependence::Dependence;
+use super::dependence::{Dependence, width};
 use super::estimate::{self, Readings};
 use super::gram::{Columns, Gram, Solved, grams, solve, total};
 use super::noise::{BalanceParts, Slopes, parts};
@@ -285,8 +285,7 @@ impl Place {
         let k = own_parameters(&self.model).len();
         Some(Judged {
             loss: 0.5 * (self.sum.log_variance + best.rss) + penalty,
-            free: self.model.vector().len() - self.model.base.len()
-                + extra.iter().map(|e| e.knots.len()).sum::<usize>(),
+            free: self.model.vector().len() - self.model.base.len() + width(extra),
             extra: extra.to_vec(),
             covariance: self.solved.covariance.view((0, 0), (k, k)).into_owned(),
             nuisances: self.table.nuisances.len(),
@@ -351,9 +350,8 @@ fn fit_together(
 /// Columns of what was added last: the last dependence's, or the last term's.
 fn added_columns(model: &Model, extra: &[Dependence]) -> core::ops::Range<usize> {
     let terms = 1 + own_parameters(model).len();
-    let of_extra = |e: &[Dependence]| e.iter().map(|e| e.knots.len()).sum::<usize>();
     match extra.split_last() {
-        Some((_, before)) => terms + of_extra(before)..terms + of_extra(extra),
+        Some((_, before)) => terms + width(before)..terms + width(extra),
         None => {
             let own = model.terms.last().map_or(0, |t| t.parameters.len());
             terms - own..terms
@@ -401,6 +399,15 @@ pub struct Guess<'a> {
 }
 
 impl<'a> Guess<'a> {
+    /// That of a model that differs in more than its last term.
+    #[must_use]
+    pub fn of(parts: &'a [BalanceParts]) -> Self {
+        Self {
+            parts,
+            added: false,
+        }
+    }
+
     /// That of a model to which something is added.
     #[must_use]
     pub fn beside(judged: &'a Judged) -> Self {
