@@ -36,10 +36,10 @@ const DEPENDENCE_WORTH: f64 = 3.0;
 /// A free dependence is said instead of a mechanism where it gains so many times as much, and so many nats more.
 const DEPENDENCE_SHARE: f64 = 1.1;
 const DEPENDENCE_NATS: f64 = 15.0;
-/// Least share by which a name that works through the force lowers the drag's residual.
-const LEAST_LOWERED: f64 = 0.02;
 /// Least memory in s that is told from a chain without any error of timing.
 const LEAST_MEMORY_S: f64 = 2.5e-3;
+/// Gains in nats that differ by less are alike.
+const ALIKE_NATS: f64 = 0.5;
 /// Finalists that are judged in each round, from each of the two screens.
 const FINALISTS: [usize; 2] = [4, 1];
 /// Most names.
@@ -63,9 +63,6 @@ pub struct Trial {
     pub gain: f64,
     /// Mean gain on unseen runs in nats, and its t over the runs.
     pub unseen: (f64, f64),
-    /// Share by which the root mean square of the drag's residual falls; `None` where it does not work through the
-    /// force.
-    pub lowered: Option<f64>,
     /// Whether its memory is longer than what the chain's own timing was off by.
     pub outlasts_chain: bool,
     /// Readings in the balances that are judged.
@@ -85,6 +82,20 @@ impl Trial {
             Claim::Mechanism(id, entry) => Some((*id, *entry)),
             Claim::Dependence(_) => None,
         }
+    }
+
+    /// Sets it against another state of the model without it.
+    fn set_against(&mut self, data: &Data, before: &Judged, base: &Judged) {
+        self.gain -= before.loss - base.loss;
+        self.unseen = unseen_gain(base, &self.judged, is_per_run(data, &self.claim));
+    }
+}
+
+/// What belongs to a run cannot be carried to another: its first half tells its second.
+fn is_per_run(data: &Data, claim: &Claim) -> bool {
+    match claim {
+        Claim::Mechanism(_, entry) => data.catalogue.get(*entry).form().contains("per_run"),
+        Claim::Dependence(_) => false,
     }
 }
 
@@ -154,7 +165,8 @@ fn start_of(data: &Data, candidate: &Candidate, score: &Score) -> Vec<f64> {
     };
     let bounds = data.catalogue.get(entry).parameters(&data.context);
     if candidate.free.is_empty() {
-        if p.len() == 1 && score.coefficients[0] > 0.0 {
+        // What is no effect's size cannot be scaled.
+        if p.len() == 1 && data.catalogue.get(entry).amplitude() == Some(0) {
             p[0] *= score.coefficients[0].clamp(0.3, 3.0);
         }
     } else {
@@ -168,8 +180,24 @@ fn start_of(data: &Data, candidate: &Candidate, score: &Score) -> Vec<f64> {
     p
 }
 
-/// Best candidates of a screen: at most `count` ids, at most two forms of each.
-fn best(table: &Table, all: &[Score], count: usize) -> Vec<(usize, Score)> {
+/// Gain of a candidate as it starts: of its best size, where it has one, else of the whole effect, no more and no less.
+fn gain_at_start(data: &Data, candidate: &Candidate, score: &Score) -> f64 {
+    let sized = |entry: usize| data.catalogue.get(entry).amplitude().is_some();
+    if candidate.free.is_empty() && candidate.entry.is_some_and(|entry| !sized(entry)) {
+        let c = score.coefficients[0];
+        if c > 0.0 {
+            score.gain * (2.0 * c - 1.0) / (c * c)
+        } else {
+            f64::NEG_INFINITY
+        }
+    } else {
+        score.gain
+    }
+}
+
+/// Best candidates of a screen: at most `count` ids, at most two forms of each, each form at its best start.
+fn best(data: &Data, table: &Table, all: &[Score], count: usize) -> Vec<(usize, Score)> {
+    let at_start = |s: &Score| gain_at_start(data, &table.candidates[s.candidate], s);
     let mut out: Vec<(usize, Score)> = Vec::new();
     let mut ids: Vec<Id> = Vec::new();
     for score in all {
@@ -200,7 +228,13 @@ fn best(table: &Table, all: &[Score], count: usize) -> Vec<(usize, Score)> {
             }
             ids.push(id);
         }
-        out.push((score.candidate, score.clone()));
+        let starts = all
+            .iter()
+            .filter(|s| table.candidates[s.candidate].entry == candidate.entry);
+        let best = starts
+            .max_by(|a, b| at_start(a).total_cmp(&at_start(b)))
+            .unwrap_or(score);
+        out.push((best.candidate, best.clone()));
     }
     out
 }
@@ -251,7 +285,7 @@ fn round(data: &Data, so_far: &Judged, excluded: &[Id], chain_s: f64) -> Vec<Tri
             let own = sizes.iter().find(|s| s.0 == candidate);
             own.map_or(0.0, |s| s.1)
         };
-        for (index, score) in best(&table, &all, count) {
+        for (index, score) in best(data, &table, &all, count) {
             let candidate = &table.candidates[index];
             if !finalists
                 .iter()
@@ -292,8 +326,41 @@ fn round(data: &Data, so_far: &Judged, excluded: &[Id], chain_s: f64) -> Vec<Tri
             Some(tried(data, so_far, claim, judged, chain_s, *size))
         })
         .collect();
-    trials.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+    rank(data, &mut trials);
     trials
+}
+
+/// Best first; of those that gain alike, the one first that claims the least.
+fn rank(data: &Data, trials: &mut [Trial]) {
+    trials.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+    least_claims_first(trials, |t| t.gain, |t| balances(data, t));
+}
+
+/// Balances that a trial's claim is about.
+fn balances(data: &Data, trial: &Trial) -> usize {
+    match trial.claim {
+        Claim::Mechanism(_, entry) => data.catalogue.get(entry).guide().touches.len(),
+        Claim::Dependence(_) => 1,
+    }
+}
+
+/// Of neighbours that gain alike, the one first that claims the least: a mass in error says less than a drag
+/// channel's scale in error, which all balances would show if they could.
+fn least_claims_first<T>(
+    best_first: &mut [T],
+    gain: impl Fn(&T) -> f64,
+    claims: impl Fn(&T) -> usize,
+) {
+    for from in 1..best_first.len() {
+        let mut at = from;
+        while at > 0
+            && gain(&best_first[at - 1]) - gain(&best_first[at]) < ALIKE_NATS
+            && claims(&best_first[at]) < claims(&best_first[at - 1])
+        {
+            best_first.swap(at - 1, at);
+            at -= 1;
+        }
+    }
 }
 
 fn tried(
@@ -305,33 +372,22 @@ fn tried(
     size: f64,
 ) -> Trial {
     let free = judged.free as f64 - base.free as f64;
-    // What belongs to a run cannot be carried to another: its first half tells its second.
-    let per_run = match &claim {
-        Claim::Mechanism(_, entry) => data.catalogue.get(*entry).form().contains("per_run"),
-        Claim::Dependence(_) => false,
-    };
+    let per_run = is_per_run(data, &claim);
     let readings = judged
         .grams
         .iter()
         .flatten()
         .map(|g| g.count)
         .sum::<usize>();
-    let lowered = match &claim {
-        Claim::Mechanism(id, _) if through_force(*id) => {
-            Some(1.0 - judged.residual_n / base.residual_n.max(1e-300))
-        }
-        _ => None,
-    };
     let outlasts_chain = match &claim {
         Claim::Mechanism(id, entry) => memory_s(data, *id, *entry, &judged.model)
-            .is_none_or(|memory| memory > LEAST_MEMORY_S.max(chain_s)),
+            .is_none_or(|memory| memory > least_memory_s(data, *id, *entry).max(chain_s)),
         Claim::Dependence(_) => true,
     };
     Trial {
         claim,
         gain: base.loss - judged.loss - PRICE_OF_PARAMETER * free - PRICE_OF_NAME,
         unseen: unseen_gain(base, &judged, per_run),
-        lowered,
         outlasts_chain,
         readings: readings / judged.parts.len().max(1),
         size,
@@ -349,6 +405,16 @@ pub fn through_force(id: Id) -> bool {
     id.balance() == Balance::Tyre && !timing
 }
 
+/// Shortest memory in s that is named: a filtered reading of the brake holds less noise than the reading itself, which
+/// looks like a short lag, so there its descriptor's smallest useful effect holds.
+fn least_memory_s(data: &Data, id: Id, entry: usize) -> f64 {
+    if id.balance() == Balance::Wheel {
+        (data.catalogue.get(entry).guide().smallest_size)(&data.context)
+    } else {
+        LEAST_MEMORY_S
+    }
+}
+
 /// Memory of a mechanism in s, where it has one.
 fn memory_s(data: &Data, id: Id, entry: usize, model: &Model) -> Option<f64> {
     let term = model.terms.iter().find(|t| t.entry == entry)?;
@@ -356,6 +422,7 @@ fn memory_s(data: &Data, id: Id, entry: usize, model: &Model) -> Option<f64> {
     match id {
         Id::BrakeLag | Id::ForceLag | Id::ForceDelay => Some(first),
         Id::RelaxationLength => Some(first / data.context.mean_speed),
+        Id::StructuralResonance => Some(1.0 / (core::f64::consts::TAU * first)),
         _ => None,
     }
 }
@@ -364,17 +431,13 @@ fn memory_s(data: &Data, id: Id, entry: usize, model: &Model) -> Option<f64> {
 #[must_use]
 pub fn stands(trial: &Trial) -> bool {
     let worth = 0.5 * LEAST_EFFECT * LEAST_EFFECT * trial.readings as f64;
-    let worth_it = trial.size.max(trial.gain) > worth;
+    let worth_it = trial.size > worth;
     let least_gain = if trial.mechanism().is_some() {
         LEAST_GAIN
     } else {
         DEPENDENCE_WORTH * worth
     };
-    trial.gain > least_gain
-        && worth_it
-        && seen_on_unseen_runs(trial)
-        && trial.lowered.is_none_or(|share| share > LEAST_LOWERED)
-        && trial.outlasts_chain
+    trial.gain > least_gain && worth_it && seen_on_unseen_runs(trial) && trial.outlasts_chain
 }
 
 /// Whether unseen runs gain: each alike, or, of a mechanism, together so much that one run may lose.
@@ -405,15 +468,26 @@ fn taken_up(trials: &[Trial]) -> Option<&Trial> {
 
 /// Decides what is named beside the base model; `chain_s` is what the chain's own timing was off by, in s.
 #[must_use]
-pub fn decide(data: &Data, base: Judged, excluded: &[Id], chain_s: f64) -> Decision {
+pub fn decide(data: &Data, mut base: Judged, excluded: &[Id], chain_s: f64) -> Decision {
     let mut chosen = base.clone();
     let mut rounds = Vec::new();
     while chosen.model.terms.len() + chosen.extra.len() < MOST_NAMES {
-        let trials = round(data, &chosen, excluded, chain_s);
-        let next = taken_up(&trials).map(|t| t.judged.clone());
+        let mut trials = round(data, &chosen, excluded, chain_s);
+        let mut next = taken_up(&trials).cloned();
+        if let Some(better) = next.as_ref().and_then(|t| at_noise_of(data, &chosen, t)) {
+            for trial in &mut trials {
+                trial.set_against(data, &chosen, &better);
+            }
+            rank(data, &mut trials);
+            if rounds.is_empty() {
+                base = better.clone();
+            }
+            chosen = better;
+            next = taken_up(&trials).cloned();
+        }
         rounds.push(trials);
         match next {
-            Some(judged) => chosen = judged,
+            Some(trial) => chosen = trial.judged,
             None => break,
         }
     }
@@ -427,35 +501,66 @@ pub fn decide(data: &Data, base: Judged, excluded: &[Id], chain_s: f64) -> Decis
     }
 }
 
-/// Takes names out that the others do not need.
+/// The model so far under noise like a trial's, where that is better: sizes of the noise that only the trial came
+/// upon are no gain of its.
+fn at_noise_of(data: &Data, so_far: &Judged, trial: &Trial) -> Option<Judged> {
+    let guess = Some(Guess::of(&trial.judged.parts));
+    let again = judge(data, &so_far.model, &so_far.extra, guess, effort(data))?;
+    (again.loss < so_far.loss - ALIKE_NATS).then_some(again)
+}
+
+/// Takes names out that the others do not need. A free dependence is no other name: it may span any of them.
 fn without_idle(data: &Data, mut chosen: Judged, chain_s: f64) -> Judged {
-    let mut at = 0;
-    while chosen.model.terms.len() > 1 && at < chosen.model.terms.len() {
-        let mut model = chosen.model.clone();
-        let term = model.terms.remove(at);
-        let claim = Claim::Mechanism(data.catalogue.get(term.entry).id(), term.entry);
-        match judge(
+    let judged = |model: &Model, extra: &[Dependence], guess: &Judged| {
+        judge(
             data,
-            &model,
-            &chosen.extra,
-            Some(Guess::of(&chosen.parts)),
+            model,
+            extra,
+            Some(Guess::of(&guess.parts)),
             effort(data),
-        ) {
-            // It was large enough when it was taken up: what counts is whether the others leave anything to it.
-            Some(without)
-                if !stands(&tried(
-                    data,
-                    &without,
-                    claim,
-                    chosen.clone(),
-                    chain_s,
-                    f64::INFINITY,
-                )) =>
-            {
-                chosen = without;
-            }
-            _ => at += 1,
+        )
+    };
+    let mut names = chosen.clone();
+    if !chosen.extra.is_empty() {
+        match judged(&chosen.model, &[], &chosen) {
+            Some(own) => names = own,
+            None => return chosen,
         }
     }
+    let mut at = 0;
+    let mut dropped = false;
+    while names.model.terms.len() > 1 && at < names.model.terms.len() {
+        let mut model = names.model.clone();
+        let term = model.terms.remove(at);
+        let claim = Claim::Mechanism(data.catalogue.get(term.entry).id(), term.entry);
+        // It was large enough when it was taken up: what counts is whether the others leave anything to it.
+        let idle = judged(&model, &[], &names).filter(|without| {
+            let size = f64::INFINITY;
+            !stands(&tried(data, without, claim, names.clone(), chain_s, size))
+        });
+        match idle {
+            Some(without) => {
+                names = without;
+                dropped = true;
+            }
+            None => at += 1,
+        }
+    }
+    if dropped {
+        chosen = judged(&names.model, &chosen.extra, &names).unwrap_or(names);
+    }
     chosen
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn of_two_that_gain_alike_the_one_that_claims_less_comes_first() {
+        // Gain and claims: only neighbours within half a nat change places.
+        let mut all = [(40.0, 1), (35.2, 3), (35.0, 1), (34.9, 2), (12.0, 1)];
+        least_claims_first(&mut all, |t| t.0, |t| t.1);
+        assert_eq!(all, [(40.0, 1), (35.0, 1), (34.9, 2), (35.2, 3), (12.0, 1)]);
+    }
 }

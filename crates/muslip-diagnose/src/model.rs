@@ -176,6 +176,10 @@ pub fn tyre<T: Listed>(
         .collect();
     run(Stage::Friction, &mut state);
     state.force = (0..n).map(|k| state.friction[k] * state.load[k]).collect();
+    // What remembers acts on what the readings say, not on what the drag, noise and all, says of them.
+    for (force, beside) in state.force.iter_mut().zip(&series.beside_law) {
+        *force = *force - *beside;
+    }
     run(Stage::Contact, &mut state);
     if terms
         .iter()

@@ -83,6 +83,9 @@ pub struct Series {
     pub drag_smooth: Vec<f64>,
     /// Standard deviation of the drag's sample-to-sample noise in N.
     pub drag_sigma: f64,
+    /// By how many N the law at the slip of `wheel` and `speed` and at `load` lies above the law at these channels' own
+    /// readings, to first order; empty where they are the readings' own.
+    pub beside_law: Vec<f64>,
     /// Brake torque in N m that enters the wheel balance, where there is a brake column.
     pub torque: Option<Channel>,
     /// Distance run since the first sample in m.
@@ -472,6 +475,7 @@ pub fn prepare(
         drag,
         drag_smooth,
         drag_sigma,
+        beside_law: Vec::new(),
         torque: torque.map(|(c, _)| c),
         distance,
         angle,

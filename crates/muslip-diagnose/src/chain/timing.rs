@@ -9,6 +9,7 @@ use crate::data::Data;
 use crate::innovations::blocks::blocks;
 use crate::innovations::gram::{solve, total};
 use crate::innovations::hypothesis::{Effort, Guess, Judged, judge, noise_stride};
+use crate::innovations::slip::reconciled;
 use crate::model::Model;
 
 /// How late the channels are against the drag channel, with what is not known of it.
@@ -28,11 +29,11 @@ impl Timing {
     /// How late the drag is, in s, where all other channels are early, and alike.
     fn drag_late(&self) -> Option<f64> {
         let all = [self.wheel, self.vehicle, self.brake];
-        let early = || all.iter().filter(|l| l.std < VAGUE_S).map(|l| -l.value);
-        let least = early().fold(f64::INFINITY, f64::min);
-        let most = early().fold(f64::NEG_INFINITY, f64::max);
-        (least.is_finite() && least > LEAST_DRAG_LATE_S && most - least < ALIKE * least + ALIKE_S)
-            .then_some(least)
+        let known = || all.iter().filter(|l| l.std < VAGUE_S);
+        let weight: f64 = known().map(|l| l.std.powi(-2)).sum();
+        let mean = known().map(|l| -l.value * l.std.powi(-2)).sum::<f64>() / weight;
+        let alike = |l: &Late| (-l.value - mean).abs() < ALIKE * mean + ALIKE_S + 2.0 * l.std;
+        (weight > 0.0 && mean > LEAST_DRAG_LATE_S && known().all(alike)).then_some(mean)
     }
 
     /// Leaves the drag as late as it is against all others.
@@ -214,12 +215,18 @@ pub fn timed(rig: &Rig, runs: &[Run], audit: &Audit) -> Option<(Data, Timing, Ju
             if brake {
                 timing.leave_brake();
             }
-            if drag.is_none() && !brake {
-                return Some((data, timing, judged));
+            let (mut data, mut judged) = (data, judged);
+            if drag.is_some() || brake {
+                data = at_one_time(rig, &runs, averaged, timing.late, audit);
+                if brake {
+                    // What is to be explained is not to be explained away.
+                    data.timing_std.brake = LEAST_STD_S;
+                }
+                judged = judge(&data, &model, &[], Some(Guess::of(&judged.parts)), effort)?;
             }
-            let data = at_one_time(rig, &runs, averaged, timing.late, audit);
+            let data = reconciled(&data, &judged);
             let before = Some(Guess::of(&judged.parts));
-            let judged = judge(&data, &model, &[], before, effort)?;
+            let judged = judge(&data, &judged.model, &[], before, effort)?;
             return Some((data, timing, judged));
         }
         guess = Some(judged.parts);
@@ -233,7 +240,8 @@ pub fn timed(rig: &Rig, runs: &[Run], audit: &Audit) -> Option<(Data, Timing, Ju
         timing.late.wheel += step(shift[0]);
         timing.late.vehicle += step(shift[1]);
         timing.late.brake += step(shift[2]);
-        timing.late.wheel_by_turn += step(shift[3]);
+        // A ring's period delays, never hastens.
+        timing.late.wheel_by_turn = (timing.late.wheel_by_turn + step(shift[3])).max(0.0);
         // What the audit knows is not given up for what a law, still wrong, would like.
         let by_turn = timing.late.wheel_by_turn;
         timing.late.wheel = within(&audit.wheel_late, timing.late.wheel + by_turn) - by_turn;

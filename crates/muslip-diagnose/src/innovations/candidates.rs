@@ -5,7 +5,7 @@ use rayon::prelude::*;
 use super::dependence::{Dependence, width};
 use super::gram::Columns;
 use super::noise::Slopes;
-use super::rows::{Rows, rows, rows_of};
+use super::rows::{Rows, quiet_force, rows, rows_of};
 use crate::data::{Data, Listed, NARROW, WIDTH};
 use crate::mechanism::{Balance, Evidence, Id};
 use crate::model::{Model, Term};
@@ -150,8 +150,12 @@ fn nuisances(data: &Data, slopes: &Slopes, run: usize) -> Vec<(Nuisance, Triple)
     let mean = data.context.mean_wheel_speed;
     // Zero-phase: what inputs and reading differ by in bandwidth, and what smoothing leaves of the slip's noise.
     let by_force = |reach: f64| -> Triple {
-        let force = &slopes.force[run];
-        let once = crate::prepare::mean_about(&s.time, force, &s.tyre, reach);
+        // As the readings say it: a lag that filters their noise must find that done already.
+        let mut force = slopes.force[run].clone();
+        for (force, beside) in force.iter_mut().zip(&s.beside_law) {
+            *force -= beside;
+        }
+        let once = crate::prepare::mean_about(&s.time, &force, &s.tyre, reach);
         let twice = crate::prepare::mean_about(&s.time, &once, &s.tyre, reach);
         [
             column(Balance::Tyre, &|k| force[k] - twice[k]),
@@ -176,22 +180,38 @@ fn nuisances(data: &Data, slopes: &Slopes, run: usize) -> Vec<(Nuisance, Triple)
             column(Balance::Vehicle, &|_| 0.0),
         ]
     };
+    // The same of a slip that moves within a window of a sensor or of the smoother: half the second derivative times
+    // the rate's square, by the window's variance in s².
+    let by_motion = || -> Triple {
+        let radius = data.context.radius;
+        let curve = |k: usize| {
+            if !s.rolling[k] {
+                return 0.0;
+            }
+            let (v, omega) = (s.speed.smooth[k], s.wheel.smooth[k]);
+            let rate = radius * (omega * speed_rate[k] / (v * v) - wheel_rate[k] / v);
+            -0.5 * slopes.curvature[run][k] * rate * rate
+        };
+        [
+            column(Balance::Tyre, &curve),
+            column(Balance::Wheel, &|_| 0.0),
+            column(Balance::Vehicle, &|_| 0.0),
+        ]
+    };
     // The same of brake and drag where they are integrated.
     let by_integral = |reach: f64, brake: bool| -> Triple {
-        let zero = vec![0.0; n];
-        let (x, segments) = match (&s.torque, brake) {
-            (Some(torque), true) => (&torque.smooth, &s.wheel_balance),
-            (None, true) => (&zero, &s.wheel_balance),
-            _ => (
-                &s.drag_smooth,
-                if s.wheel_balance.is_empty() {
-                    &s.vehicle_balance
-                } else {
-                    &s.wheel_balance
-                },
-            ),
+        let segments = if s.wheel_balance.is_empty() {
+            &s.vehicle_balance
+        } else {
+            &s.wheel_balance
         };
-        let once = crate::prepare::mean_about(&s.time, x, segments, reach);
+        // A lag of the brake filters its reading's noise, and must find that done already; nothing does that to the drag's.
+        let x = match (&s.torque, brake) {
+            (_, false) => quiet_force(s, &slopes.force[run]),
+            (Some(torque), true) => torque.smooth.clone(),
+            (None, true) => vec![0.0; n],
+        };
+        let once = crate::prepare::mean_about(&s.time, &x, segments, reach);
         let twice = crate::prepare::mean_about(&s.time, &once, segments, reach);
         let mut sum = 0.0;
         let level: Vec<f64> = (0..n)
@@ -251,6 +271,10 @@ fn nuisances(data: &Data, slopes: &Slopes, run: usize) -> Vec<(Nuisance, Triple)
         (
             nuisance("law's curvature under slip noise", 1.0),
             by_curvature(),
+        ),
+        (
+            nuisance("law's curvature under moving slip", 1e-4),
+            by_motion(),
         ),
         (
             nuisance("vehicle speed low-passed", 3e-3),

@@ -57,6 +57,8 @@ pub struct Effort {
 
 /// Parameters whose step would gain less, in nats, are the best.
 const SMALL_GAIN: f64 = 0.2;
+/// What is known of a parameter without any reading: its standard deviation as a share of its range.
+const SHARE_OF_RANGE: f64 = 0.3;
 /// Blocks of one balance that are enough for the sizes of its noise.
 const ENOUGH_BLOCKS: usize = 6000;
 
@@ -264,7 +266,7 @@ impl Place {
         self.model.with(&p)
     }
 
-    fn judged(self, extra: &[Dependence]) -> Option<Judged> {
+    fn judged(self, data: &Data, extra: &[Dependence]) -> Option<Judged> {
         let prior = |i: usize| precision(&self.table, i);
         let n = self.sum.products.nrows();
         let chosen: Vec<usize> = (1..n).collect();
@@ -276,7 +278,14 @@ impl Place {
             coefficients[i - 1] = best.coefficients[at];
         }
         let penalty: f64 = self.noise.iter().map(estimate::penalty).sum();
-        let unseen = |own: &Gram| outside(own, &self.sum, &chosen, &prior);
+        let bounds = bounds(data, &self.model);
+        let own: Vec<usize> = own_parameters(&self.model);
+        let wide = |i: usize| match own.get(i - 1) {
+            Some(&p) => (SHARE_OF_RANGE * (bounds[p].1 - bounds[p].0)).powi(-2),
+            None => prior(i),
+        };
+        let all = solve(&self.sum.products, &chosen, &wide)?;
+        let unseen = |own: &Gram| outside(own, &self.sum, &all, &chosen, &wide);
         let runs = self
             .grams
             .iter()
@@ -440,7 +449,7 @@ pub fn judge(
     .descended(data, extra, effort.steps)?
     .refitted(data, extra, effort, added)?
     .descended(data, extra, effort.steps.div_ceil(2))?
-    .judged(extra)
+    .judged(data, extra)
 }
 
 /// Root mean square of what the coefficients of all columns, those of the chain included, leave of the drag, in N.
@@ -459,14 +468,73 @@ fn drag_residual(table: &Table, coefficients: &DVector<f64>) -> f64 {
     (square / f64::max(count, 1.0)).sqrt()
 }
 
-/// Negative log likelihood of a part of the readings under parameters from all others.
-fn outside(own: &Gram, sum: &Gram, chosen: &[usize], prior: &dyn Fn(usize) -> f64) -> Option<f64> {
-    let rest = &sum.products - &own.products;
-    let solved = solve(&rest, chosen, prior)?;
-    let mut c = DVector::zeros(own.products.nrows());
-    c[0] = 1.0;
-    for (at, &i) in chosen.iter().enumerate() {
-        c[i] = solved.coefficients[at];
+/// Negative log likelihood of a part of the readings, given all others: parameters that the others do not know are as
+/// wide as these leave them.
+fn outside(
+    own: &Gram,
+    sum: &Gram,
+    all: &Solved,
+    chosen: &[usize],
+    prior: &dyn Fn(usize) -> f64,
+) -> Option<f64> {
+    let rest = solve(&(&sum.products - &own.products), chosen, prior)?;
+    Some(0.5 * (own.log_variance + all.rss - rest.rss + all.log_det - rest.log_det))
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::DMatrix;
+
+    use super::*;
+
+    /// Inner products of a residual and its columns, unit white noise.
+    fn gram(residual: &DVector<f64>, columns: &DMatrix<f64>) -> Gram {
+        let n = residual.len();
+        let all = DMatrix::from_fn(1 + columns.ncols(), n, |i, k| match i {
+            0 => residual[k],
+            _ => columns[(k, i - 1)],
+        });
+        Gram {
+            products: &all * all.transpose(),
+            log_variance: 0.0,
+            count: n,
+        }
     }
-    Some(0.5 * (own.log_variance + c.dot(&(&own.products * &c))))
+
+    /// Minus the log density of a residual whose coefficients have this prior precision, without the constant.
+    fn dense(residual: &DVector<f64>, columns: &DMatrix<f64>, precision: f64) -> f64 {
+        let n = residual.len();
+        let covariance = DMatrix::identity(n, n) + columns * columns.transpose() / precision;
+        let factor = covariance.cholesky().unwrap();
+        let log_det: f64 = factor.l_dirty().diagonal().iter().map(|x| x.ln()).sum();
+        log_det + 0.5 * residual.dot(&factor.solve(residual))
+    }
+
+    #[test]
+    fn what_others_leave_unknown_widens_the_prediction_of_a_run() {
+        // The second column is hardly seen in the first run: dense conditioning says what the second costs.
+        let wave = |k: usize, f: f64| (f * k as f64 + 0.3).sin();
+        let x = DMatrix::from_fn(12, 2, |k, i| match (k < 6, i) {
+            (_, 0) => wave(k, 0.7),
+            (true, _) => 0.05 * wave(k, 1.3),
+            (false, _) => 2.0 * wave(k, 1.3),
+        });
+        let e = DVector::from_fn(12, |k, _| {
+            1.5 * wave(k, 0.7) - 2.0 * x[(k, 1)] + wave(k, 5.1)
+        });
+        let part = |from: usize| (e.rows(from, 6).into_owned(), x.rows(from, 6).into_owned());
+        let ((e1, x1), (e2, x2)) = (part(0), part(6));
+        let (first, second) = (gram(&e1, &x1), gram(&e2, &x2));
+        let mut sum = first;
+        sum.add(&second);
+        let prior = |_: usize| 0.5;
+        let all = solve(&sum.products, &[1, 2], &prior).unwrap();
+        let found = outside(&second, &sum, &all, &[1, 2], &prior).unwrap();
+        let expected = dense(&e, &x, 0.5) - dense(&e1, &x1, 0.5);
+        assert!((found - expected).abs() < 1e-6, "{found} {expected}");
+        // With its parameters taken for certain it would cost far more.
+        let certain = solve(&(&sum.products - &second.products), &[1, 2], &prior).unwrap();
+        let left = &e2 + &x2 * &certain.coefficients;
+        assert!(0.5 * left.norm_squared() > found);
+    }
 }

@@ -9,4 +9,7 @@ pub mod hypothesis;
 pub mod noise;
 pub mod rows;
 pub mod screen;
+pub mod slip;
+#[cfg(test)]
+mod toy;
 pub mod whiten;

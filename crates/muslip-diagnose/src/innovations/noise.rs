@@ -1,9 +1,15 @@
 //! The noise of the three balances: which parts there are, by what they enter, and how large they start.
 
+use super::rows::quiet_force;
 use super::whiten::{DIFFUSE, Kind, Part, Whitener};
 use crate::data::Data;
 use crate::mechanism::Balance;
 use crate::omnibus::finite_or_zero;
+
+/// Memory in s of the wheel speed's noise in the slip: so many of the smoother's windows, within bounds.
+const WINDOWS: f64 = 1.5;
+const SHORTEST_MEMORY_S: f64 = 0.015;
+const LONGEST_MEMORY_S: f64 = 0.1;
 
 /// One part of a balance's noise over the campaign.
 #[derive(Clone, Debug)]
@@ -20,6 +26,8 @@ pub struct Source {
     pub log_start: f64,
     /// The largest that the sensors alone make plausible, on the same scale.
     pub log_cap: f64,
+    /// Whether it is an error of the slip, which enters by the law's slope.
+    pub of_slip: bool,
 }
 
 /// Noise of one balance.
@@ -130,6 +138,9 @@ pub fn parts(data: &Data, slopes: &Slopes) -> Vec<BalanceParts> {
     let wheel = sigma(&|s| s.wheel.sigma).max(1e-6 * data.context.mean_wheel_speed);
     let speed = sigma(&|s| s.speed.sigma).max(1e-6 * data.context.mean_speed);
     let torque = sigma(&|s| s.torque.as_ref().map_or(0.0, |t| t.sigma));
+    // White noise that the smoother has passed remembers about as long as its window.
+    let share = sigma(&|s| median(s.wheel.variance_share.iter().copied())).max(1e-3);
+    let smoothed = (WINDOWS * dt / share).clamp(SHORTEST_MEMORY_S, LONGEST_MEMORY_S);
     let none: Vec<Vec<f64>> = vec![Vec::new(); s.len()];
     let averaged = |balance: Balance, gain: &[Vec<f64>]| -> Vec<Vec<f64>> {
         gain.iter()
@@ -144,6 +155,11 @@ pub fn parts(data: &Data, slopes: &Slopes) -> Vec<BalanceParts> {
         log_std: std.max(1e-12).ln(),
         log_start: std.max(1e-12).ln(),
         log_cap: cap.max(1e-12).ln(),
+        of_slip: false,
+    };
+    let of_slip = |source: Source| Source {
+        of_slip: true,
+        ..source
     };
     let friction = 1.0;
     let (radius, inertia, mass) = (data.context.radius, data.context.inertia, data.context.mass);
@@ -152,6 +168,12 @@ pub fn parts(data: &Data, slopes: &Slopes) -> Vec<BalanceParts> {
         .iter()
         .map(|s| s.time.iter().map(|t| t - s.time[0]).collect())
         .collect();
+    // Of the law, for the reading's own noise, integrated, is the walk: scaling it would buy the walk away.
+    let impulse: Vec<Vec<f64>> = s
+        .iter()
+        .zip(&slopes.force)
+        .map(|(s, law)| integral(&s.dt, &quiet_force(s, law)))
+        .collect();
     let mut all = Vec::new();
     let formed = |balance| s.iter().any(|s| !s.segments(balance).is_empty());
     if formed(Balance::Tyre) {
@@ -159,20 +181,20 @@ pub fn parts(data: &Data, slopes: &Slopes) -> Vec<BalanceParts> {
             balance: Balance::Tyre,
             sources: vec![
                 source("white", None, &none, drag, f64::INFINITY),
-                source(
+                of_slip(source(
                     "wheel speed",
-                    Some(Kind::Forgetting(0.015)),
+                    Some(Kind::Forgetting(smoothed)),
                     &slopes.wheel,
                     0.5 * wheel,
                     f64::INFINITY,
-                ),
-                source(
+                )),
+                of_slip(source(
                     "vehicle speed",
                     Some(Kind::Forgetting(0.2)),
                     &slopes.speed,
                     0.3 * speed,
                     f64::INFINITY,
-                ),
+                )),
                 source(
                     "drag, coloured",
                     Some(Kind::Forgetting(0.07)),
@@ -221,10 +243,12 @@ pub fn parts(data: &Data, slopes: &Slopes) -> Vec<BalanceParts> {
     if formed(Balance::Wheel) {
         let turned: Vec<Vec<f64>> = s
             .iter()
-            .map(|s| {
-                s.torque
-                    .as_ref()
-                    .map_or(Vec::new(), |t| integral(&s.dt, &t.smooth))
+            .zip(&impulse)
+            .map(|(s, impulse)| {
+                let slowed = s.wheel.slow.iter().zip(impulse);
+                slowed
+                    .map(|(omega, p)| finite_or_zero(radius * p - inertia * omega))
+                    .collect()
             })
             .collect();
         let walk = (radius * drag).hypot(torque) * dt.sqrt();
@@ -280,7 +304,6 @@ pub fn parts(data: &Data, slopes: &Slopes) -> Vec<BalanceParts> {
         });
     }
     if formed(Balance::Vehicle) {
-        let impulse: Vec<Vec<f64>> = s.iter().map(|s| integral(&s.dt, &s.drag_smooth)).collect();
         let walk = drag * dt.sqrt();
         let level = mass * speed;
         all.push(BalanceParts {
@@ -362,6 +385,23 @@ impl BalanceParts {
     pub fn white(&self) -> f64 {
         let white = self.sources.iter().find(|s| s.kind.is_none());
         white.map_or(0.0, |s| s.log_std.exp())
+    }
+
+    /// Variances of a block of one run as fitted: of what is in error of the slip, times the law's slope, and of all
+    /// else.
+    #[must_use]
+    pub fn variances(&self, run: usize, block: usize) -> [f64; 2] {
+        let mut all = [0.0; 2];
+        for source in &self.sources {
+            // What belongs to a run is no noise that a model could follow.
+            if source.kind == Some(Kind::Constant) {
+                continue;
+            }
+            let gain = source.gain[run].get(block).copied().unwrap_or(1.0);
+            let variance = (2.0 * source.log_std).exp() * gain * gain;
+            all[usize::from(!source.of_slip)] += variance;
+        }
+        all
     }
 
     /// Parts with a memory on one run, in the order of the sources.

@@ -39,6 +39,17 @@ pub fn rows_of(data: &Data, model: &Model, run: usize) -> Rows<f64> {
     rows(&data.catalogue, model, &p, &data.series[run], &data.context)
 }
 
+/// The force by a law where there is one, else the reading less its noise, in N.
+#[must_use]
+pub fn quiet_force(series: &Series, law: &[f64]) -> Vec<f64> {
+    (0..series.len())
+        .map(|k| match law.get(k) {
+            Some(f) if series.rolling[k] && f.is_finite() && !series.tyre.is_empty() => *f,
+            _ => series.drag_smooth[k],
+        })
+        .collect()
+}
+
 /// Rows of a model. Terms act on every balance that they touch.
 pub fn rows<T: Listed>(
     catalogue: &Catalogue,
@@ -55,6 +66,7 @@ pub fn rows<T: Listed>(
         .as_ref()
         .map(|contact| (0..n).map(|k| state.force[k] - contact[k]).collect());
     let of_chain = |k: usize| chain.as_ref().map_or(zero, |c| c[k]);
+    let by_law: Vec<f64> = state.force.iter().map(|f| f.value()).collect();
     let wanted = |stage: Stage| {
         let mut state = State::empty();
         state.opposing = vec![zero; n];
@@ -75,14 +87,8 @@ pub fn rows<T: Listed>(
     };
     // Deviations from the base are made of what does not hold the residual's own noise, or a parameter could buy
     // noise by scaling it: the drag's by the model's reading, the speeds' by their slow part.
-    let modelled = |k: usize| {
-        let f = state.force[k].value();
-        if series.rolling[k] && f.is_finite() && !series.tyre.is_empty() {
-            f
-        } else {
-            series.drag_smooth[k]
-        }
-    };
+    let quiet = quiet_force(series, &by_law);
+    let modelled = |k: usize| quiet[k];
     let force = |gain: T, k: usize| {
         (T::constant(1.0) / (gain + 1.0) - 1.0) * (-of_chain(k) + modelled(k))
             + (-of_chain(k) + series.drag[k])

@@ -1,0 +1,179 @@
+//! The slip as speeds and drag together know it.
+//!
+//! Where the curve is steep, the drag tells the slip far better than the speeds do. A model that is evaluated at the
+//! speeds' own slip holds their noise there, and whatever makes the curve flatter would buy that noise away: a curve
+//! that starts too flat, friction that falls at low sliding speed. So the curve is taken at the slip that speeds and drag agree on,
+//! s = s₀ + K (F − N mu(s₀)) with K = g σs² / (g² σs² + σF²), and the row is F − N mu(s) − g (s₀ − s): to
+//! first order the same, but with the noise of the speeds where it belongs, beside the curve (orthogonal regression;
+//! W. A. Fuller, Measurement Error Models, Wiley 1987, section 3.2).
+
+use super::hypothesis::Judged;
+use super::noise::{BalanceParts, Slopes};
+use crate::data::Data;
+use crate::mechanism::Balance;
+use crate::prepare::{Series, mean_about};
+
+/// Reach in s of the means of what the drag says of the slip.
+const REACH_S: f64 = 0.008;
+/// Farthest that the slip is moved, in its standard deviations.
+const FARTHEST_STDS: f64 = 3.0;
+
+/// The campaign with its slip reconciled with the drag under a base law and its noise; the drag's own readings, and
+/// what the wheel and the vehicle are weighed by, stay as they are.
+#[must_use]
+pub fn reconciled(data: &Data, base: &Judged) -> Data {
+    let mut data = data.clone();
+    let tyre = |p: &&BalanceParts| p.balance == Balance::Tyre;
+    let Some(parts) = base.parts.iter().find(tyre) else {
+        return data;
+    };
+    let slopes = Slopes::new(&data, &base.model.base);
+    let radius = data.context.radius;
+    for (run, s) in data.series.iter_mut().enumerate() {
+        let blocks = &data.blocks[run][Balance::Tyre as usize].samples;
+        let left: Vec<f64> = s
+            .drag_smooth
+            .iter()
+            .zip(&slopes.force[run])
+            .map(|(drag, law)| drag - law)
+            .collect();
+        // What is faster is the drag's own noise.
+        let once = mean_about(&s.time, &left, &s.tyre, REACH_S);
+        let left = mean_about(&s.time, &once, &s.tyre, REACH_S);
+        let mut beside = vec![0.0; s.len()];
+        for (block, samples) in blocks.iter().enumerate() {
+            let [of_slip, of_force] = parts.variances(run, block);
+            for k in samples.clone() {
+                let g = slopes.slip[run][k];
+                let per_slip = s.speed.smooth[k] / radius;
+                if g == 0.0 || !(per_slip > 0.0) || !(of_slip > 0.0) {
+                    continue;
+                }
+                let share = of_slip / (of_slip + of_force);
+                let farthest = FARTHEST_STDS * of_slip.sqrt();
+                let force = (share * left[k]).clamp(-farthest, farthest);
+                if force.is_finite() {
+                    // Where the curve is flat the force says nothing of the slip.
+                    let by = force / g;
+                    s.wheel.smooth[k] -= by * per_slip;
+                    beside[k] = force;
+                }
+            }
+        }
+        let quiet = quiet_load(s);
+        for k in s.tyre.iter().flat_map(Clone::clone) {
+            let removed = s.load.smooth[k] - quiet[k];
+            let friction = slopes.force[run][k] / s.load.smooth[k];
+            if removed.is_finite() && friction.is_finite() {
+                s.load.smooth[k] = quiet[k];
+                beside[k] -= friction * removed;
+            }
+        }
+        s.beside_law = beside;
+    }
+    data
+}
+
+/// The load without what of its fast part is no more than its sensor's noise.
+fn quiet_load(s: &Series) -> Vec<f64> {
+    let load = &s.load;
+    let (mut all, mut noise) = (0.0, 0.0);
+    for k in s.tyre.iter().flat_map(Clone::clone) {
+        let fast = load.smooth[k] - load.slow[k];
+        if fast.is_finite() {
+            all += fast * fast;
+            noise += load.sigma * load.sigma * load.variance_share[k];
+        }
+    }
+    let share = f64::max(1.0 - noise / f64::max(all, 1e-300), 0.0);
+    let both = load.smooth.iter().zip(&load.slow);
+    both.map(|(smooth, slow)| slow + share * (smooth - slow))
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::innovations::hypothesis::{Effort, judge};
+    use crate::innovations::rows::rows_of;
+    use crate::innovations::toy::{CRITICAL, Noise, PEAK, stop};
+    use crate::model::Model;
+
+    const NOISE: Noise = Noise {
+        wheel: 0.3,
+        drag: 15.0,
+        load: 40.0,
+        torque: 5.0,
+    };
+
+    fn judged(data: &Data) -> Judged {
+        let effort = Effort {
+            steps: 3,
+            noise_steps: 15,
+            noise_stride: 1,
+        };
+        judge(data, &Model::of_law(PEAK, CRITICAL), &[], None, effort).unwrap()
+    }
+
+    /// Share of the tyre's residual on free rolling, in blocks, that a factor on the law's force would take away.
+    fn bought(data: &Data, model: &Model) -> f64 {
+        let blocks = &data.blocks[0][0];
+        let e = blocks.mean(&rows_of(data, model, 0).tyre);
+        let law = blocks.mean(&Slopes::new(data, &model.base).force[0]);
+        let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+        // Free rolling: what the law says there is noise.
+        let rolling: Vec<usize> = (0..e.len()).filter(|k| law[*k].abs() < 150.0).collect();
+        assert!(rolling.len() > 200, "{}", rolling.len());
+        let take = |x: &[f64]| rolling.iter().map(|k| x[*k]).collect::<Vec<_>>();
+        let (e, law) = (take(&e), take(&law));
+        -dot(&e, &law) / dot(&e, &e)
+    }
+
+    #[test]
+    fn rows_stay_what_they_are_to_first_order() {
+        let data = stop(NOISE, 1);
+        let base = judged(&data);
+        let other = reconciled(&data, &base);
+        let (a, b) = (
+            rows_of(&data, &base.model, 0).tyre,
+            rows_of(&other, &base.model, 0).tyre,
+        );
+        let rms = |x: &mut dyn Iterator<Item = f64>| {
+            let all: Vec<f64> = x.filter(|x| x.is_finite()).collect();
+            (all.iter().map(|x| x * x).sum::<f64>() / all.len() as f64).sqrt()
+        };
+        let moved = rms(&mut other.series[0].beside_law.iter().copied());
+        let changed = rms(&mut a.iter().zip(&b).map(|(a, b)| a - b));
+        assert!(moved > 20.0, "{moved}");
+        assert!(changed < 0.1 * moved, "{changed} of {moved}");
+    }
+
+    #[test]
+    fn a_curve_made_flatter_buys_no_noise_of_the_speeds() {
+        let data = stop(NOISE, 2);
+        let base = judged(&data);
+        let (before, after) = (
+            bought(&data, &base.model),
+            bought(&reconciled(&data, &base), &base.model),
+        );
+        assert!(before > 0.8, "{before}");
+        assert!(after.abs() < 0.5 * before, "{after} of {before}");
+    }
+
+    #[test]
+    fn a_load_that_only_its_noise_moves_is_taken_as_steady() {
+        let data = stop(NOISE, 3);
+        let quiet = reconciled(&data, &judged(&data));
+        let spread = |data: &Data| {
+            let load = &data.series[0].load.smooth;
+            let mean = load.iter().sum::<f64>() / load.len() as f64;
+            (load.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / load.len() as f64).sqrt()
+        };
+        assert!(
+            spread(&quiet) < 0.6 * spread(&data),
+            "{} {}",
+            spread(&quiet),
+            spread(&data)
+        );
+    }
+}
