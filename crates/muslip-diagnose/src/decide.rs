@@ -26,6 +26,8 @@ const LEAST_GAIN: f64 = 5.0;
 const LEAST_EFFECT: f64 = 0.07;
 /// Least t of the gains on unseen runs.
 const LEAST_T: f64 = 1.5;
+/// Least t of gains that are small, but of all unseen runs.
+const LEAST_T_IN_ALL: f64 = 4.0;
 /// Gain of all unseen runs together, in nats, and least t, that do as well: effects need not show alike in all runs.
 const LEAST_TOGETHER: f64 = 15.0;
 const LEAST_T_TOGETHER: f64 = 1.0;
@@ -437,7 +439,10 @@ pub fn stands(trial: &Trial) -> bool {
     } else {
         DEPENDENCE_WORTH * worth
     };
-    trial.gain > least_gain && worth_it && seen_on_unseen_runs(trial) && trial.outlasts_chain
+    // What belongs to a run leaves of an effect between runs a few nats, but from every run.
+    let alike_in_all = trial.gain > 0.0 && trial.unseen.1 > LEAST_T_IN_ALL;
+    let enough = trial.gain > least_gain || (trial.mechanism().is_some() && alike_in_all);
+    enough && worth_it && seen_on_unseen_runs(trial) && trial.outlasts_chain
 }
 
 /// Whether unseen runs gain: each alike, or, of a mechanism, together so much that one run may lose.

@@ -253,19 +253,19 @@ fn nuisances(data: &Data, slopes: &Slopes, run: usize) -> Vec<(Nuisance, Triple)
             nuisance("wheel speed late by turn", 0.001),
             by_wheel(&|k| wheel_rate[k] * mean / s.wheel.smooth[k].abs().max(0.1 * mean)),
         ),
-        (nuisance("force smoothed, 6 ms", 1.0), by_force(0.006)),
-        (nuisance("force smoothed, 20 ms", 1.0), by_force(0.02)),
-        (nuisance("force smoothed, 60 ms", 0.5), by_force(0.06)),
+        (nuisance("force smoothed, 6 ms", 4.0), by_force(0.006)),
+        (nuisance("force smoothed, 20 ms", 3.0), by_force(0.02)),
+        (nuisance("force smoothed, 60 ms", 1.0), by_force(0.06)),
         (
-            nuisance("brake smoothed, 6 ms", 1.0),
+            nuisance("brake smoothed, 6 ms", 4.0),
             by_integral(0.006, true),
         ),
         (
-            nuisance("brake smoothed, 20 ms", 1.0),
+            nuisance("brake smoothed, 20 ms", 3.0),
             by_integral(0.02, true),
         ),
         (
-            nuisance("drag smoothed, 20 ms", 1.0),
+            nuisance("drag smoothed, 20 ms", 3.0),
             by_integral(0.02, false),
         ),
         (
