@@ -95,6 +95,7 @@ fn quiet_load(s: &Series) -> Vec<f64> {
 mod tests {
     use super::*;
     use crate::innovations::hypothesis::{Effort, judge};
+    use crate::innovations::noise::parts;
     use crate::innovations::rows::rows_of;
     use crate::innovations::toy::{CRITICAL, Noise, PEAK, stop};
     use crate::model::Model;
@@ -112,7 +113,10 @@ mod tests {
             noise_steps: 15,
             noise_stride: 1,
         };
-        judge(data, &Model::of_law(PEAK, CRITICAL), &[], None, effort).unwrap()
+        let mut base = judge(data, &Model::of_law(PEAK, CRITICAL), &[], None, effort).unwrap();
+        // The sensors' own sizes: fitted ones may call the speeds' noise the drag's.
+        base.parts = parts(data, &Slopes::new(data, &base.model.base));
+        base
     }
 
     /// Share of the tyre's residual on free rolling, in blocks, that a factor on the law's force would take away.
