@@ -212,12 +212,7 @@ fn channel(
             smoother[k] = sum / total;
         }
     }
-    let slow = mean_about(
-        time,
-        &mean_about(time, &value, segments, SLOW_REACH_S),
-        segments,
-        SLOW_REACH_S,
-    );
+    let slow = mean_twice_about(time, &value, segments, SLOW_REACH_S);
     Channel {
         raw,
         smooth: value,
@@ -252,6 +247,18 @@ pub fn mean_about(time: &[f64], x: &[f64], segments: &[Range<usize>], reach: f64
         }
     }
     out
+}
+
+/// The mean of [`mean_about`], taken twice: weights that fall off to both sides.
+#[must_use]
+pub fn mean_twice_about(
+    time: &[f64],
+    x: &[f64],
+    segments: &[Range<usize>],
+    reach: f64,
+) -> Vec<f64> {
+    let once = mean_about(time, x, segments, reach);
+    mean_about(time, &once, segments, reach)
 }
 
 /// Prepares one run. `extra_names` fixes the order of the other columns over the campaign, `reach_factor`

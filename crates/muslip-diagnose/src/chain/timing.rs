@@ -224,7 +224,7 @@ pub fn timed(rig: &Rig, runs: &[Run], audit: &Audit) -> Option<(Data, Timing, Ju
                 }
                 judged = judge(&data, &model, &[], Some(Guess::of(&judged.parts)), effort)?;
             }
-            let data = reconciled(&data, &judged);
+            let data = reconciled(data, &judged);
             let before = Some(Guess::of(&judged.parts));
             let judged = judge(&data, &judged.model, &[], before, effort)?;
             return Some((data, timing, judged));

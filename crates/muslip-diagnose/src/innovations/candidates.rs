@@ -11,6 +11,7 @@ use crate::mechanism::{Balance, Evidence, Id};
 use crate::model::{Model, Term};
 use crate::number::{Dual, Number};
 use crate::omnibus::finite_or_zero;
+use crate::prepare::mean_twice_about;
 
 /// Rows of one run by balance, in the order tyre, wheel, vehicle.
 pub type Triple = [Vec<f64>; 3];
@@ -133,6 +134,13 @@ fn nuisances(data: &Data, slopes: &Slopes, run: usize) -> Vec<(Nuisance, Triple)
             (0..n).map(|k| finite_or_zero(f(k))).collect()
         }
     };
+    let of_tyre = |f: &dyn Fn(usize) -> f64| -> Triple {
+        [
+            column(Balance::Tyre, f),
+            column(Balance::Wheel, &|_| 0.0),
+            column(Balance::Vehicle, &|_| 0.0),
+        ]
+    };
     let by_wheel = |u: &dyn Fn(usize) -> f64| -> Triple {
         [
             column(Balance::Tyre, &|k| -slopes.wheel[run][k] * u(k)),
@@ -155,13 +163,8 @@ fn nuisances(data: &Data, slopes: &Slopes, run: usize) -> Vec<(Nuisance, Triple)
         for (force, beside) in force.iter_mut().zip(&s.beside_law) {
             *force -= beside;
         }
-        let once = crate::prepare::mean_about(&s.time, &force, &s.tyre, reach);
-        let twice = crate::prepare::mean_about(&s.time, &once, &s.tyre, reach);
-        [
-            column(Balance::Tyre, &|k| force[k] - twice[k]),
-            column(Balance::Wheel, &|_| 0.0),
-            column(Balance::Vehicle, &|_| 0.0),
-        ]
+        let mean = mean_twice_about(&s.time, &force, &s.tyre, reach);
+        of_tyre(&|k| force[k] - mean[k])
     };
     // A mean over noisy slip is not the law at the mean slip: half its second derivative times the noise's variance.
     let by_curvature = || -> Triple {
@@ -174,11 +177,7 @@ fn nuisances(data: &Data, slopes: &Slopes, run: usize) -> Vec<(Nuisance, Triple)
                 + (radius * s.wheel.smooth[k] / s.speed.smooth[k].powi(2) * s.speed.sigma).powi(2);
             -0.5 * slopes.curvature[run][k] * noise
         };
-        [
-            column(Balance::Tyre, &curve),
-            column(Balance::Wheel, &|_| 0.0),
-            column(Balance::Vehicle, &|_| 0.0),
-        ]
+        of_tyre(&curve)
     };
     // The same of a slip that moves within a window of a sensor or of the smoother: half the second derivative times
     // the rate's square, by the window's variance in s².
@@ -192,11 +191,7 @@ fn nuisances(data: &Data, slopes: &Slopes, run: usize) -> Vec<(Nuisance, Triple)
             let rate = radius * (omega * speed_rate[k] / (v * v) - wheel_rate[k] / v);
             -0.5 * slopes.curvature[run][k] * rate * rate
         };
-        [
-            column(Balance::Tyre, &curve),
-            column(Balance::Wheel, &|_| 0.0),
-            column(Balance::Vehicle, &|_| 0.0),
-        ]
+        of_tyre(&curve)
     };
     // The same of brake and drag where they are integrated.
     let by_integral = |reach: f64, brake: bool| -> Triple {
@@ -211,12 +206,11 @@ fn nuisances(data: &Data, slopes: &Slopes, run: usize) -> Vec<(Nuisance, Triple)
             (Some(torque), true) => torque.smooth.clone(),
             (None, true) => vec![0.0; n],
         };
-        let once = crate::prepare::mean_about(&s.time, &x, segments, reach);
-        let twice = crate::prepare::mean_about(&s.time, &once, segments, reach);
+        let mean = mean_twice_about(&s.time, &x, segments, reach);
         let mut sum = 0.0;
         let level: Vec<f64> = (0..n)
             .map(|k| {
-                let d = (x[k] - twice[k]) * s.dt[k].min(0.1);
+                let d = (x[k] - mean[k]) * s.dt[k].min(0.1);
                 if d.is_finite() {
                     sum += d;
                 }

@@ -88,9 +88,8 @@ pub fn rows<T: Listed>(
     // Deviations from the base are made of what does not hold the residual's own noise, or a parameter could buy
     // noise by scaling it: the drag's by the model's reading, the speeds' by their slow part.
     let quiet = quiet_force(series, &by_law);
-    let modelled = |k: usize| quiet[k];
     let force = |gain: T, k: usize| {
-        (T::constant(1.0) / (gain + 1.0) - 1.0) * (-of_chain(k) + modelled(k))
+        (T::constant(1.0) / (gain + 1.0) - 1.0) * (-of_chain(k) + quiet[k])
             + (-of_chain(k) + series.drag[k])
     };
     let integral = |rate: &dyn Fn(usize) -> T, level: &dyn Fn(usize) -> T| -> Vec<T> {
@@ -138,7 +137,7 @@ pub fn rows<T: Listed>(
         let lighter = T::constant(1.0) / (vehicle.inertia_change + 1.0) - 1.0;
         integral(
             &|k| {
-                let slowing = -of_chain(k) + modelled(k) + vehicle.opposing[k];
+                let slowing = -of_chain(k) + quiet[k] + vehicle.opposing[k];
                 force(vehicle.gain_change, k) + vehicle.opposing[k] + lighter * slowing
             },
             &|k| T::constant(context.mass * series.speed.raw[k]),

@@ -2,8 +2,8 @@
 //!
 //! Where the curve is steep, the drag tells the slip far better than the speeds do. A model that is evaluated at the
 //! speeds' own slip holds their noise there, and whatever makes the curve flatter would buy that noise away: a curve
-//! that starts too flat, friction that falls at low sliding speed. So the curve is taken at the slip that speeds and drag agree on,
-//! s = s₀ + K (F − N mu(s₀)) with K = g σs² / (g² σs² + σF²), and the row is F − N mu(s) − g (s₀ − s): to
+//! that starts too flat, friction that falls at low sliding speed. So the curve is taken at the slip that speeds and
+//! drag agree on, s = s₀ + K (F − N mu(s₀)) with K = g σs² / (g² σs² + σF²), and the row is F − N mu(s) − g (s₀ − s): to
 //! first order the same, but with the noise of the speeds where it belongs, beside the curve (orthogonal regression;
 //! W. A. Fuller, Measurement Error Models, Wiley 1987, section 3.2).
 
@@ -11,7 +11,7 @@ use super::hypothesis::Judged;
 use super::noise::{BalanceParts, Slopes};
 use crate::data::Data;
 use crate::mechanism::Balance;
-use crate::prepare::{Series, mean_about};
+use crate::prepare::{Series, mean_twice_about};
 
 /// Reach in s of the means of what the drag says of the slip.
 const REACH_S: f64 = 0.008;
@@ -21,8 +21,7 @@ const FARTHEST_STDS: f64 = 3.0;
 /// The campaign with its slip reconciled with the drag under a base law and its noise; the drag's own readings, and
 /// what the wheel and the vehicle are weighed by, stay as they are.
 #[must_use]
-pub fn reconciled(data: &Data, base: &Judged) -> Data {
-    let mut data = data.clone();
+pub fn reconciled(mut data: Data, base: &Judged) -> Data {
     let tyre = |p: &&BalanceParts| p.balance == Balance::Tyre;
     let Some(parts) = base.parts.iter().find(tyre) else {
         return data;
@@ -38,8 +37,7 @@ pub fn reconciled(data: &Data, base: &Judged) -> Data {
             .map(|(drag, law)| drag - law)
             .collect();
         // What is faster is the drag's own noise.
-        let once = mean_about(&s.time, &left, &s.tyre, REACH_S);
-        let left = mean_about(&s.time, &once, &s.tyre, REACH_S);
+        let left = mean_twice_about(&s.time, &left, &s.tyre, REACH_S);
         let mut beside = vec![0.0; s.len()];
         for (block, samples) in blocks.iter().enumerate() {
             let [of_slip, of_force] = parts.variances(run, block);
@@ -137,7 +135,7 @@ mod tests {
     fn rows_stay_what_they_are_to_first_order() {
         let data = stop(NOISE, 1);
         let base = judged(&data);
-        let other = reconciled(&data, &base);
+        let other = reconciled(data.clone(), &base);
         let (a, b) = (
             rows_of(&data, &base.model, 0).tyre,
             rows_of(&other, &base.model, 0).tyre,
@@ -158,7 +156,7 @@ mod tests {
         let base = judged(&data);
         let (before, after) = (
             bought(&data, &base.model),
-            bought(&reconciled(&data, &base), &base.model),
+            bought(&reconciled(data.clone(), &base), &base.model),
         );
         assert!(before > 0.8, "{before}");
         assert!(after.abs() < 0.5 * before, "{after} of {before}");
@@ -167,7 +165,7 @@ mod tests {
     #[test]
     fn a_load_that_only_its_noise_moves_is_taken_as_steady() {
         let data = stop(NOISE, 3);
-        let quiet = reconciled(&data, &judged(&data));
+        let quiet = reconciled(data.clone(), &judged(&data));
         let spread = |data: &Data| {
             let load = &data.series[0].load.smooth;
             let mean = load.iter().sum::<f64>() / load.len() as f64;

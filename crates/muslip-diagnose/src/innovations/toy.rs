@@ -18,7 +18,7 @@ const STEP_S: f64 = 5e-3;
 const INNER: usize = 10;
 
 /// Standard deviations of the channels' white noise.
-#[derive(Clone, Copy, Default)]
+#[derive(Clone, Copy)]
 pub(super) struct Noise {
     pub(super) wheel: f64,
     pub(super) drag: f64,
