@@ -4,7 +4,6 @@ use std::sync::Arc;
 
 use rayon::prelude::*;
 
-use crate::ablation::Ablation;
 use crate::campaign::{Rig, Run};
 use crate::chain::correct::TimingStd;
 use crate::innovations::blocks::Blocks;
@@ -15,14 +14,11 @@ use crate::smooth::median_in_place;
 
 /// Width of the dual numbers: parameters differentiated in one pass.
 pub const WIDTH: usize = 8;
-/// Width of the narrow dual numbers: a mechanism's own parameters when a start is judged.
-pub const NARROW: usize = 2;
 
 /// The catalogue in plain and in dual numbers, in the same order.
 pub struct Catalogue {
     plain: Vec<Box<dyn Mechanism<f64>>>,
     dual: Vec<Box<dyn Mechanism<Dual<WIDTH>>>>,
-    narrow: Vec<Box<dyn Mechanism<Dual<NARROW>>>>,
 }
 
 impl Default for Catalogue {
@@ -30,7 +26,6 @@ impl Default for Catalogue {
         Self {
             plain: catalogue(),
             dual: catalogue(),
-            narrow: catalogue(),
         }
     }
 }
@@ -63,12 +58,6 @@ impl Listed for f64 {
 impl Listed for Dual<WIDTH> {
     fn entry(catalogue: &Catalogue, index: usize) -> &dyn Mechanism<Self> {
         catalogue.dual[index].as_ref()
-    }
-}
-
-impl Listed for Dual<NARROW> {
-    fn entry(catalogue: &Catalogue, index: usize) -> &dyn Mechanism<Self> {
-        catalogue.narrow[index].as_ref()
     }
 }
 
@@ -112,6 +101,52 @@ fn slip_noise_share(series: &[Series], context: &Context) -> f64 {
     if total > 0.0 { slip / total } else { 0.0 }
 }
 
+/// Least gain in nats of a law over no force at all, where a drag says anything of friction.
+const LEAST_OF_FRICTION: f64 = 60.0;
+/// Smallest noise of a drag, as a share of its root mean square.
+const LEAST_NOISE: f64 = 1e-3;
+
+/// Whether the drag follows the rig file's law, at whatever peak, better than none: a run without braking has nothing
+/// to fit a law to.
+fn speaks_of_friction(series: &[Series], context: &Context) -> bool {
+    let critical = context.nominal[1];
+    let (mut xx, mut xy, mut yy, mut count) = (0.0, 0.0, 0.0, 0.0);
+    for s in series {
+        for k in s
+            .tyre
+            .iter()
+            .flat_map(Clone::clone)
+            .filter(|k| s.rolling[*k])
+        {
+            let x = s.slip(k, context.radius) / critical;
+            let shape = s.load.smooth[k] * 2.0 * x / (1.0 + x * x);
+            if (shape * s.drag[k]).is_finite() {
+                xx += shape * shape;
+                xy += shape * s.drag[k];
+                yy += s.drag[k] * s.drag[k];
+                count += 1.0;
+            }
+        }
+    }
+    let noise = context
+        .drag_sigma
+        .powi(2)
+        .max(LEAST_NOISE.powi(2) * yy / count);
+    xy > 0.0 && xy * xy / xx > 2.0 * LEAST_OF_FRICTION * noise
+}
+
+/// Takes the tyre balance from a run, and says why.
+fn silenced(series: &mut Series) -> DataFault {
+    series.tyre.clear();
+    DataFault {
+        recording: series.name.clone(),
+        channel: "drag_force_n".to_owned(),
+        start_s: series.time.first().copied().unwrap_or(0.0),
+        end_s: series.time.last().copied().unwrap_or(0.0),
+        what: "drag that says nothing of friction: no braking in the recordings".to_owned(),
+    }
+}
+
 /// Mean over samples that pass a filter; `fallback` if there are none.
 fn mean(values: impl Iterator<Item = f64>, fallback: f64) -> f64 {
     let (mut sum, mut count) = (0.0, 0.0);
@@ -125,7 +160,7 @@ fn mean(values: impl Iterator<Item = f64>, fallback: f64) -> f64 {
 impl Data {
     /// Prepares all runs of a campaign.
     #[must_use]
-    pub fn new(rig: &Rig, runs: &[Run], ablation: Ablation) -> Self {
+    pub fn new(rig: &Rig, runs: &[Run]) -> Self {
         let mut extra_names: Vec<String> = Vec::new();
         for run in runs {
             for (column, _) in &run.extra {
@@ -134,18 +169,12 @@ impl Data {
                 }
             }
         }
-        if ablation.prefilter {
-            return Self::prepared(rig, runs, &extra_names, 0.0);
-        }
         let mut reach_factor = 1.0;
         loop {
             let data = Self::prepared(rig, runs, &extra_names, reach_factor);
             // Noise that is left in the slip looks like physics: where it is a good part of the residual, wider
             // windows cost less than they save.
-            if ablation.errors_in_variables
-                || reach_factor >= MOST_REACH
-                || data.slip_noise_share() <= SLIP_NOISE_SHARE
-            {
+            if reach_factor >= MOST_REACH || data.slip_noise_share() <= SLIP_NOISE_SHARE {
                 return data;
             }
             reach_factor *= 2.0;
@@ -158,40 +187,26 @@ impl Data {
             .enumerate()
             .map(|(index, run)| prepare(rig, run, extra_names, index, reach_factor))
             .collect();
-        let (series, faults): (Vec<Series>, Vec<Vec<DataFault>>) = prepared.into_iter().unzip();
+        let (mut series, faults): (Vec<Series>, Vec<Vec<DataFault>>) = prepared.into_iter().unzip();
+        let mut faults = faults.concat();
         let context = Context {
             reach_factor,
             ..Self::context_of(rig, &series)
         };
+        if series.iter().any(|s| !s.tyre.is_empty()) && !speaks_of_friction(&series, &context) {
+            faults.extend(series.iter_mut().map(silenced));
+        }
         Self {
             rig: rig.clone(),
             series,
             context,
             extra_names: extra_names.to_vec(),
-            faults: faults.concat(),
+            faults,
             averaged: 1,
             blocks: Vec::new(),
             timing_std: TimingStd::default(),
             catalogue: Arc::default(),
         }
-    }
-
-    /// The same campaign smoothed over windows wider or narrower by a factor, everything else as it was.
-    #[must_use]
-    pub fn smoothed_otherwise(&self, runs: &[Run], factor: f64) -> Self {
-        let reach_factor = self.context.reach_factor * factor;
-        let mut other = Self::prepared(&self.rig, runs, &self.extra_names, reach_factor);
-        other.context = Context {
-            reach_factor,
-            ..self.context.clone()
-        };
-        for (new, old) in other.series.iter_mut().zip(&self.series) {
-            // The same samples must be judged.
-            new.tyre.clone_from(&old.tyre);
-            new.rolling.clone_from(&old.rolling);
-            new.still.clone_from(&old.still);
-        }
-        other
     }
 
     /// Share of the tyre residual's noise power that comes from noise left in the smoothed slip, 0..=1.

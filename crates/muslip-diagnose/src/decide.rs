@@ -12,6 +12,8 @@ use crate::innovations::hypothesis::{
 use crate::innovations::noise::Slopes;
 use crate::innovations::rows::rows_of;
 use crate::innovations::screen::{Score, scores};
+use crate::law::closest;
+use crate::looked::{self, POWER, Seen};
 use crate::mechanism::{Balance, Evidence, Id};
 use crate::model::{Model, Term};
 
@@ -24,13 +26,10 @@ const LEAST_GAIN: f64 = 5.0;
 /// Least effect that is worth a name, as a share of one whitened reading's standard deviation: of the gain, half
 /// its square a reading.
 const LEAST_EFFECT: f64 = 0.07;
-/// Least t of the gains on unseen runs.
-const LEAST_T: f64 = 1.5;
+/// Least t of the gains on unseen runs: about Student's at five percent, one-sided, for as many runs as campaigns have.
+const LEAST_T: f64 = 2.0;
 /// Least t of gains that are small, but of all unseen runs.
 const LEAST_T_IN_ALL: f64 = 4.0;
-/// Gain of all unseen runs together, in nats, and least t, that do as well: effects need not show alike in all runs.
-const LEAST_TOGETHER: f64 = 15.0;
-const LEAST_T_TOGETHER: f64 = 1.0;
 /// The same of a free dependence, which says nothing of what it is.
 const LEAST_T_OF_DEPENDENCE: f64 = 3.0;
 /// Least gain of a free dependence over that of the least effect worth a name.
@@ -42,6 +41,11 @@ const DEPENDENCE_NATS: f64 = 15.0;
 const LEAST_MEMORY_S: f64 = 2.5e-3;
 /// Gains in nats that differ by less are alike.
 const ALIKE_NATS: f64 = 0.5;
+/// Least logarithm by which a name that works through the force lowers the mean square error of the drag.
+const LEAST_PREDICTED: f64 = 0.01;
+/// Of names that gain alike, to this share, the one comes first that predicts the drag better by this logarithm.
+const ALIKE_SHARE: f64 = 0.7;
+pub const PREDICTED_APART: f64 = 0.1;
 /// Finalists that are judged in each round, from each of the two screens.
 const FINALISTS: [usize; 2] = [4, 1];
 /// Most names.
@@ -72,6 +76,9 @@ pub struct Trial {
     /// Gain in nats if the noise were no larger than the sensors make plausible: how large the effect is, whatever
     /// the runs' own differences hide of it.
     pub size: f64,
+    /// By how much the model with it predicts the drag better: minus the mean over runs of the logarithm of the mean
+    /// square error over that without it. Infinite for what does not work through the force.
+    pub predicts: f64,
     /// The model with it.
     pub judged: Judged,
 }
@@ -109,6 +116,8 @@ pub struct Decision {
     pub chosen: Judged,
     /// Trials of each round, best first.
     pub rounds: Vec<Vec<Trial>>,
+    /// How large each mechanism would have to be to be seen beside the base model.
+    pub seen: Vec<Seen>,
 }
 
 /// Mean and t of what unseen runs gain; half runs where a parameter belongs to its run.
@@ -146,13 +155,14 @@ fn evidence(data: &Data, model: &Model) -> Vec<Evidence> {
             for k in s.tyre.iter().flat_map(Clone::clone) {
                 weight[k] = s.drag_sigma.powi(-2).min(1e12);
             }
+            let none = r.tyre.is_empty();
             Evidence {
-                predicted: s.drag.iter().zip(&r.tyre).map(|(a, b)| a - b).collect(),
-                residual: if r.tyre.is_empty() {
+                predicted: if none {
                     vec![0.0; s.len()]
                 } else {
-                    r.tyre
+                    s.drag.iter().zip(&r.tyre).map(|(a, b)| a - b).collect()
                 },
+                residual: if none { vec![0.0; s.len()] } else { r.tyre },
                 weight,
             }
         })
@@ -241,6 +251,11 @@ fn best(data: &Data, table: &Table, all: &[Score], count: usize) -> Vec<(usize, 
     out
 }
 
+/// Whether any run says anything of a balance: what belongs to one that cannot be formed is not named for another.
+fn formed(data: &Data, balance: Balance) -> bool {
+    data.series.iter().any(|s| !s.segments(balance).is_empty())
+}
+
 /// Effort of a finalist's judgement.
 fn effort(data: &Data) -> Effort {
     Effort {
@@ -250,8 +265,21 @@ fn effort(data: &Data) -> Effort {
     }
 }
 
+/// What a round found.
+struct Round {
+    /// Best first.
+    trials: Vec<Trial>,
+    /// How large each mechanism would have to be to be seen.
+    seen: Vec<Seen>,
+}
+
+/// Standard deviations from which an effect of one parameter is named in four cases of five.
+fn detectable() -> f64 {
+    (2.0 * (LEAST_GAIN + PRICE_OF_PARAMETER + PRICE_OF_NAME)).sqrt() + POWER
+}
+
 /// One round: every finalist beside the model so far.
-fn round(data: &Data, so_far: &Judged, excluded: &[Id], chain_s: f64) -> Vec<Trial> {
+fn round(data: &Data, so_far: &Judged, excluded: &[Id], chain_s: f64) -> Round {
     let effort = effort(data);
     let slopes = Slopes::new(data, &so_far.model.base);
     let free = dependence::all(data, &so_far.model);
@@ -267,20 +295,22 @@ fn round(data: &Data, so_far: &Judged, excluded: &[Id], chain_s: f64) -> Vec<Tri
         &found,
         &so_far.extra,
         &free,
-        &|id| !taken(id),
+        &|id| !taken(id) && formed(data, id.balance()),
     );
     let mechanisms = table.candidates.len() - free.len();
     let mut finalists: Vec<(usize, Vec<f64>, f64)> = Vec::new();
     let mut sizes: Vec<(usize, f64)> = Vec::new();
+    let mut seen = Vec::new();
     for (parts, count) in [
         (capped(&so_far.parts), FINALISTS[0]),
         (so_far.parts.clone(), FINALISTS[1]),
     ] {
         let sum = total(&table_grams(data, &parts, &table));
-        let Some((_, _, all)) = scores(&table, &sum) else {
+        let Some(all) = scores(&table, &sum) else {
             continue;
         };
         if sizes.is_empty() {
+            seen = looked::seen(data, &table, &all, detectable());
             sizes = all.iter().map(|s| (s.candidate, s.gain)).collect();
         }
         let size = |candidate: usize| {
@@ -329,13 +359,33 @@ fn round(data: &Data, so_far: &Judged, excluded: &[Id], chain_s: f64) -> Vec<Tri
         })
         .collect();
     rank(data, &mut trials);
-    trials
+    Round { trials, seen }
 }
 
 /// Best first; of those that gain alike, the one first that claims the least.
 fn rank(data: &Data, trials: &mut [Trial]) {
     trials.sort_by(|a, b| b.gain.total_cmp(&a.gain));
     least_claims_first(trials, |t| t.gain, |t| balances(data, t));
+    better_predicted_first(trials, |t| t.gain, |t| t.predicts);
+}
+
+/// Of those that gain much the same and work through the force, the one first that predicts the drag clearly better.
+fn better_predicted_first<T>(
+    best_first: &mut [T],
+    gain: impl Fn(&T) -> f64,
+    predicts: impl Fn(&T) -> f64,
+) {
+    for from in 1..best_first.len() {
+        let mut at = from;
+        while at > 0
+            && gain(&best_first[at]) > ALIKE_SHARE * gain(&best_first[at - 1])
+            && predicts(&best_first[at]).is_finite()
+            && predicts(&best_first[at]) > predicts(&best_first[at - 1]) + PREDICTED_APART
+        {
+            best_first.swap(at - 1, at);
+            at -= 1;
+        }
+    }
 }
 
 /// Balances that a trial's claim is about.
@@ -381,6 +431,12 @@ fn tried(
         .flatten()
         .map(|g| g.count)
         .sum::<usize>();
+    let predicts = match &claim {
+        Claim::Mechanism(id, _) if through_force(*id) => {
+            predicts_better_by(data, &base.model, &judged.model)
+        }
+        _ => f64::INFINITY,
+    };
     let outlasts_chain = match &claim {
         Claim::Mechanism(id, entry) => memory_s(data, *id, *entry, &judged.model)
             .is_none_or(|memory| memory > least_memory_s(data, *id, *entry).max(chain_s)),
@@ -391,6 +447,7 @@ fn tried(
         gain: base.loss - judged.loss - PRICE_OF_PARAMETER * free - PRICE_OF_NAME,
         unseen: unseen_gain(base, &judged, per_run),
         outlasts_chain,
+        predicts,
         readings: readings / judged.parts.len().max(1),
         size,
         judged,
@@ -429,6 +486,26 @@ fn memory_s(data: &Data, id: Id, entry: usize, model: &Model) -> Option<f64> {
     }
 }
 
+/// Minus the mean over runs of the logarithm of the mean square error of the drag by one model over that by another,
+/// each with the law that predicts best and nothing of the chain's nuisances: those may stand for an effect.
+fn predicts_better_by(data: &Data, without: &Model, with: &Model) -> f64 {
+    let drags: Vec<Vec<f64>> = data.series.iter().map(|s| s.drag.clone()).collect();
+    let [without, with] = [without, with].map(|model| closest(data, model, &drags));
+    let square = |model: &Model, run: usize| -> f64 {
+        let e = rows_of(data, model, run).tyre;
+        let used = data.series[run].tyre.iter().flat_map(Clone::clone);
+        used.filter_map(|k| e.get(k))
+            .filter(|e| e.is_finite())
+            .map(|e| e * e)
+            .sum()
+    };
+    let ratios: Vec<f64> = (0..data.series.len())
+        .map(|run| (square(&without, run) / square(&with, run)).ln())
+        .filter(|ratio| ratio.is_finite())
+        .collect();
+    ratios.iter().sum::<f64>() / ratios.len().max(1) as f64
+}
+
 /// Whether a trial stands.
 #[must_use]
 pub fn stands(trial: &Trial) -> bool {
@@ -442,17 +519,18 @@ pub fn stands(trial: &Trial) -> bool {
     // What belongs to a run leaves of an effect between runs a few nats, but from every run.
     let alike_in_all = trial.gain > 0.0 && trial.unseen.1 > LEAST_T_IN_ALL;
     let enough = trial.gain > least_gain || (trial.mechanism().is_some() && alike_in_all);
-    enough && worth_it && seen_on_unseen_runs(trial) && trial.outlasts_chain
+    let predicts = trial.predicts > LEAST_PREDICTED;
+    enough && worth_it && seen_on_unseen_runs(trial) && trial.outlasts_chain && predicts
 }
 
-/// Whether unseen runs gain: each alike, or, of a mechanism, together so much that one run may lose.
+/// Whether unseen runs gain, and alike.
 fn seen_on_unseen_runs(trial: &Trial) -> bool {
     let (mean, t) = trial.unseen;
-    if trial.mechanism().is_none() {
-        return mean > 0.0 && t > LEAST_T_OF_DEPENDENCE;
-    }
-    let together = mean * trial.judged.unseen.len() as f64;
-    mean > 0.0 && (t > LEAST_T || (together > LEAST_TOGETHER && t > LEAST_T_TOGETHER))
+    let least = match trial.claim {
+        Claim::Mechanism(..) => LEAST_T,
+        Claim::Dependence(_) => LEAST_T_OF_DEPENDENCE,
+    };
+    mean > 0.0 && t >= least
 }
 
 /// The trial that is taken up: a mechanism, unless a free dependence accounts for much more.
@@ -476,8 +554,13 @@ fn taken_up(trials: &[Trial]) -> Option<&Trial> {
 pub fn decide(data: &Data, mut base: Judged, excluded: &[Id], chain_s: f64) -> Decision {
     let mut chosen = base.clone();
     let mut rounds = Vec::new();
+    let mut seen = None;
     while chosen.model.terms.len() + chosen.extra.len() < MOST_NAMES {
-        let mut trials = round(data, &chosen, excluded, chain_s);
+        let Round {
+            mut trials,
+            seen: found,
+        } = round(data, &chosen, excluded, chain_s);
+        seen.get_or_insert(found);
         let mut next = taken_up(&trials).cloned();
         if let Some(better) = next.as_ref().and_then(|t| at_noise_of(data, &chosen, t)) {
             for trial in &mut trials {
@@ -503,6 +586,7 @@ pub fn decide(data: &Data, mut base: Judged, excluded: &[Id], chain_s: f64) -> D
         base,
         chosen,
         rounds,
+        seen: seen.unwrap_or_default(),
     }
 }
 
@@ -560,6 +644,21 @@ fn without_idle(data: &Data, mut chosen: Judged, chain_s: f64) -> Judged {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn of_those_that_gain_much_the_same_the_one_that_predicts_clearly_better_comes_first() {
+        // Gain and prediction: what gains less than 0.7 of another, or predicts but little better, stays behind it.
+        let mut all = [
+            (400.0, 1.0),
+            (330.0, 1.4),
+            (310.0, 1.45),
+            (100.0, 9.0),
+            (90.0, f64::INFINITY),
+        ];
+        better_predicted_first(&mut all, |t| t.0, |t| t.1);
+        let gains = all.map(|t| t.0);
+        assert_eq!(gains, [330.0, 310.0, 400.0, 100.0, 90.0]);
+    }
 
     #[test]
     fn of_two_that_gain_alike_the_one_that_claims_less_comes_first() {

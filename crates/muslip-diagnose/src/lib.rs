@@ -8,18 +8,16 @@
 //!
 //! | step | module |
 //! | --- | --- |
-//! | what is given | [`campaign`], `cleaning`, [`prepare`], [`smooth`], [`data`] |
-//! | what is kept for the proof | [`split`] |
+//! | what is given | [`campaign`], `cleaning`, [`prepare`], `smooth`, [`data`] |
+//! | what is kept for the proof | `split` |
+//! | the measuring chain | [`audit`], [`chain`] |
 //! | the simulation and its balances | [`model`], [`mechanism`], [`number`] |
-//! | noise from the data | [`noise`], [`saturated`], [`omnibus`], [`variable`], [`regression`] |
-//! | joint fit | [`fit`] |
-//! | choice | [`choose`], [`validation`], [`otherwise`], [`place_or_time`], [`tyre_stage`], [`dynamics_stage`] |
-//! | remainder | [`remainder`], [`lines`], [`dynamics_remainder`] |
-//! | proof | [`proof`] |
-//! | location | [`locate`], `size` |
-//! | how sure, and what was looked for | [`confidence`], [`separating`], [`looked`] |
-//! | what each part is worth | [`ablation`] |
-//! | result and repaired model | [`diagnose`](mod@diagnose), [`outcome`], [`repaired`], [`imbalance`] |
+//! | residuals in level form, their covariance, innovations | `innovations` |
+//! | candidates, finalists, what is named | `decide`, `looked`, `separating` |
+//! | how large, and how sure | `figures`, [`diagnose`](mod@diagnose) |
+//! | location | `locate`, `variable` |
+//! | repair and proof | [`repaired`], [`correction`], `noise`, [`proof`] |
+//! | result | [`diagnose`](mod@diagnose), [`outcome`], [`imbalance`] |
 //!
 //! It knows no file format and no terminal, and gives the same result whatever the number of threads.
 #![forbid(unsafe_code)]
@@ -28,43 +26,29 @@
     reason = "`!(x > 0.0)` sends NaN the refusing way"
 )]
 
-pub mod ablation;
-pub mod answer;
 pub mod audit;
 pub mod campaign;
 pub mod chain;
-pub mod choose;
 mod cleaning;
-pub mod confidence;
+pub mod correction;
 pub mod data;
-pub mod decide;
+mod decide;
 pub mod diagnose;
-pub mod dynamics_remainder;
-pub mod dynamics_stage;
-pub mod fit;
+mod figures;
 pub mod imbalance;
-pub mod innovations;
-pub mod lines;
-pub mod locate;
-pub mod looked;
+mod innovations;
+mod law;
+mod locate;
+mod looked;
 pub mod mechanism;
 pub mod model;
-pub mod noise;
+mod noise;
 pub mod number;
-pub mod omnibus;
-pub mod otherwise;
 pub mod outcome;
-pub mod place_or_time;
 pub mod prepare;
 pub mod proof;
-pub mod regression;
-pub mod remainder;
 pub mod repaired;
-pub mod saturated;
-pub mod separating;
-mod size;
-pub mod smooth;
-pub mod split;
-pub mod tyre_stage;
-pub mod validation;
-pub mod variable;
+mod separating;
+mod smooth;
+mod split;
+mod variable;

@@ -1,15 +1,16 @@
-//! Noise from the data: how large, how coloured, and where. Models are compared on whitened
-//! innovations only, or slow noise would be read as physics.
+//! Noise of the drag readings about a model's prediction: how large, by what it depends on, and how coloured.
 
 use core::ops::Range;
 
+use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 /// Longest autoregression tried.
 const MAX_ORDER: usize = 6;
-/// The same for means over blocks, of which there are few.
-const MAX_BLOCK_ORDER: usize = 10;
+/// Passes of weighted least squares, and the square of a residual over its variance beyond which it counts no more.
+const PASSES: usize = 4;
+const CLIPPED_SQUARE: f64 = 10.0;
 /// Residuals are clipped at this many standard deviations before the autoregression is fitted.
 const CLIP: f64 = 3.5;
 /// Innovations beyond this many standard deviations count linearly (Huber 1964).
@@ -39,21 +40,73 @@ impl NoiseSize {
             self.typical
         }
     }
+
+    /// Fits the size to what a model leaves, by the force and what slip noise does to it, both in N: three passes of
+    /// weighted least squares on clipped squares, each part held non-negative.
+    #[must_use]
+    pub fn fitted(rest: &[f64], depends_on: &[[f64; 2]]) -> Self {
+        let typical = robust_sigma(rest).max(1e-300);
+        let least = 0.05 * typical * typical;
+        let features: Vec<Vector3<f64>> = depends_on
+            .iter()
+            .map(|[force, slip]| Vector3::new(1.0, force * force, slip * slip))
+            .collect();
+        let mut parts = Vector3::new(typical * typical, 0.0, 0.0);
+        for _ in 0..PASSES {
+            let mut products = Matrix3::<f64>::zeros();
+            let mut squares = Vector3::<f64>::zeros();
+            for (f, r) in features.iter().zip(rest) {
+                let variance = parts.dot(f).max(1e-4 * typical * typical);
+                let weight = 1.0 / (variance * variance);
+                products += weight * f * f.transpose();
+                squares += weight * (r * r).min(CLIPPED_SQUARE * variance) * f;
+            }
+            parts = non_negative(&products, &squares);
+        }
+        Self {
+            parts: parts.into(),
+            least,
+            typical,
+        }
+    }
 }
 
-/// A stationary noise model: d = (1 − θB)/(1 − Σ aᵢBⁱ) e with white e of standard deviation `sigma`, for means d
-/// of `block` samples.
-///
-/// `theta` is the moving-average root that differencing a noisy speed leaves behind; it is zero for
-/// the tyre balance. Wheel and vehicle are judged on means over several samples: sample by sample the noise of a
-/// differenced speed drowns the slow noise that any effect has to be told from, and no short autoregression
-/// describes both.
+/// Non-negative solution of three normal equations: what comes out negative is left out, one pass after the other.
+fn non_negative(products: &Matrix3<f64>, right: &Vector3<f64>) -> Vector3<f64> {
+    let mut active = [true; 3];
+    loop {
+        let places: Vec<usize> = (0..3)
+            .filter(|i| active[*i] && products[(*i, *i)] > 0.0)
+            .collect();
+        let scale = |i: usize| products[(places[i], places[i])].sqrt();
+        let matrix = DMatrix::from_fn(places.len(), places.len(), |i, j| {
+            let value = products[(places[i], places[j])] / (scale(i) * scale(j));
+            if i == j { value + 1e-9 } else { value }
+        });
+        let scaled = DVector::from_fn(places.len(), |i, _| right[places[i]] / scale(i));
+        let mut solution = Vector3::zeros();
+        let Some(solved) = matrix.cholesky().map(|c| c.solve(&scaled)) else {
+            return solution;
+        };
+        let mut negative = false;
+        for (i, &place) in places.iter().enumerate() {
+            let value = solved[i] / scale(i);
+            if value < 0.0 {
+                active[place] = false;
+                negative = true;
+            } else {
+                solution[place] = value;
+            }
+        }
+        if !negative {
+            return solution;
+        }
+    }
+}
+
+/// A stationary noise model: d = e/(1 − Σ aᵢBⁱ) with white e of standard deviation `sigma`.
 #[derive(Clone, Debug)]
 pub struct Whitener {
-    /// Samples that are averaged before anything else, at least one.
-    pub block: usize,
-    /// Moving-average root, 0..1.
-    pub theta: f64,
     /// Autoregressive coefficients.
     pub ar: Vec<f64>,
     /// Standard deviation of the innovations.
@@ -61,156 +114,40 @@ pub struct Whitener {
 }
 
 impl Whitener {
-    /// White noise of unit variance.
-    #[must_use]
-    pub fn unit() -> Self {
-        Self {
-            block: 1,
-            theta: 0.0,
-            ar: Vec::new(),
-            sigma: 1.0,
-        }
-    }
-
-    /// Number of innovations that `apply` yields for these segments.
-    #[must_use]
-    pub fn count(&self, segments: &[Range<usize>]) -> usize {
-        segments
-            .iter()
-            .map(|s| self.averages(s.len()).saturating_sub(self.ar.len()))
-            .sum()
-    }
-
     /// Appends the innovations of `x` (in units of `sigma`) to `out`, segment by segment; the first
     /// samples of a segment are conditioned on.
     pub fn apply(&self, x: &[f64], segments: &[Range<usize>], out: &mut Vec<f64>) {
         let order = self.ar.len();
-        let scale = 1.0 / self.sigma;
-        let mut moving = Vec::new();
-        let mut means = Vec::new();
         for segment in segments {
-            let mut part = &x[segment.clone()];
-            if self.block > 1 {
-                self.average(part, &mut means);
-                part = &means;
+            let own = &x[segment.clone()];
+            for k in order..own.len() {
+                let past: f64 = self.ar.iter().zip(1..).map(|(a, i)| a * own[k - i]).sum();
+                out.push((own[k] - past) / self.sigma);
             }
-            if part.len() <= order {
-                continue;
-            }
-            let u = if self.theta == 0.0 {
-                part
-            } else {
-                let mut previous = 0.0;
-                moving.clear();
-                moving.extend(part.iter().map(|value| {
-                    previous = value + self.theta * previous;
-                    previous
-                }));
-                &moving[..]
-            };
-            // One pass a coefficient: each is a plain sum of two slices, which the compiler vectorises.
-            let from = out.len();
-            out.extend(u[order..].iter().map(|v| v * scale));
-            let tail = &mut out[from..];
-            for (i, a) in self.ar.iter().enumerate() {
-                let share = a * scale;
-                for (e, h) in tail.iter_mut().zip(&u[order - 1 - i..]) {
-                    *e -= share * h;
-                }
-            }
-            if self.theta > 0.0 {
-                self.forget_start(tail);
-            }
-        }
-    }
-
-    /// Number of averages of a segment of so many samples.
-    #[must_use]
-    pub fn averages(&self, samples: usize) -> usize {
-        if self.block > 1 {
-            (samples / self.block).saturating_sub(1)
-        } else {
-            samples
-        }
-    }
-
-    /// Averages with triangular weights two blocks wide, one a block: the imbalance of a differenced speed becomes
-    /// that of the difference of its means over two blocks, and no sample of the speed is lost.
-    fn average(&self, x: &[f64], out: &mut Vec<f64>) {
-        out.clear();
-        let m = self.block;
-        let share = 1.0 / (m * m) as f64;
-        for pair in 0..self.averages(x.len()) {
-            let both = &x[pair * m..(pair + 2) * m];
-            let (rising, falling) = both.split_at(m);
-            let mut sum = 0.0;
-            for (i, (a, b)) in rising.iter().zip(falling).enumerate() {
-                // Weights 1..m, then m−1..0: a sample of the difference lies between two of the speed.
-                sum += (i + 1) as f64 * a + (m - 1 - i) as f64 * b;
-            }
-            out.push(sum * share);
-        }
-    }
-
-    /// Takes out of a segment's innovations what the unknown sum before its first sample left in them: with a root
-    /// near one it would stay for the whole segment, and look like a constant force.
-    fn forget_start(&self, innovations: &mut [f64]) {
-        let order = self.ar.len() as i32;
-        let gain: f64 = 1.0
-            - self
-                .ar
-                .iter()
-                .zip(1..)
-                .map(|(a, i)| a * self.theta.powi(-i))
-                .sum::<f64>();
-        let mut trace = gain * self.theta.powi(order + 1);
-        let (mut along, mut power) = (0.0, 0.1);
-        let first = trace;
-        for e in innovations.iter() {
-            along += trace * e;
-            power += trace * trace;
-            trace *= self.theta;
-        }
-        let share = along / power;
-        trace = first;
-        for e in innovations {
-            *e -= share * trace;
-            trace *= self.theta;
         }
     }
 
     /// Fits the autoregression (order by BIC) and the innovation size to residuals in which no
-    /// mismatch is left, for a given block and moving-average root.
+    /// mismatch is left.
     #[must_use]
-    pub fn fit(residual: &[f64], segments: &[Range<usize>], block: usize, theta: f64) -> Self {
-        let unit = Self {
-            block,
-            theta,
-            ar: Vec::new(),
-            sigma: 1.0,
-        };
-        let mut u = Vec::with_capacity(residual.len());
-        unit.apply(residual, segments, &mut u);
-        let level = robust_sigma(&u);
+    pub fn fit(residual: &[f64], segments: &[Range<usize>]) -> Self {
+        let used: Vec<f64> = segments
+            .iter()
+            .flat_map(|s| residual[s.clone()].iter().copied())
+            .collect();
+        let level = robust_sigma(&used);
         if !(level > 0.0) {
-            return Self { sigma: 1.0, ..unit };
+            return Self {
+                ar: Vec::new(),
+                sigma: 1.0,
+            };
         }
-        for value in &mut u {
-            *value = value.clamp(-CLIP * level, CLIP * level);
-        }
-        let most = if block > 1 {
-            MAX_BLOCK_ORDER
-        } else {
-            MAX_ORDER
-        };
-        let mut covariance = vec![0.0; most + 1];
-        let mut start = 0;
-        let mut count = 0.0;
-        for segment in segments {
-            let length = unit.averages(segment.len());
-            let part = &u[start..start + length];
-            start += length;
-            count += part.len() as f64;
+        let clipped: Vec<f64> = residual
+            .iter()
+            .map(|x| x.clamp(-CLIP * level, CLIP * level))
+            .collect();
+        let mut covariance = [0.0; MAX_ORDER + 1];
+        for part in segments.iter().map(|s| &clipped[s.clone()]) {
             for (lag, c) in covariance.iter_mut().enumerate() {
                 if part.len() > lag {
                     *c += part
@@ -221,8 +158,9 @@ impl Whitener {
                 }
             }
         }
+        let count = used.len() as f64;
         let mut best = (f64::INFINITY, Vec::new());
-        for order in 0..=most {
+        for order in 0..=MAX_ORDER {
             let (ar, variance) = levinson(&covariance, order);
             let bic = count * variance.max(1e-300).ln() + order as f64 * count.max(2.0).ln();
             if bic < best.0 - 1e-9 {
@@ -230,8 +168,6 @@ impl Whitener {
             }
         }
         let mut fitted = Self {
-            block,
-            theta,
             ar: best.1,
             sigma: 1.0,
         };
@@ -298,13 +234,6 @@ pub fn loss(e: f64) -> f64 {
     }
 }
 
-/// Weight of an innovation in the normal equations: derivative of the loss over e.
-#[must_use]
-pub fn weight(e: f64) -> f64 {
-    let a = e.abs();
-    if a <= HUBER { 1.0 } else { HUBER / a }
-}
-
 /// Probability of so large a Ljung-Box statistic if the innovations were white (20 lags, with the
 /// variance of each autocorrelation taken robustly by clipping); `None` with too few of them.
 #[must_use]
@@ -359,7 +288,7 @@ mod tests {
         }
         let all = 0..x.len();
         let segments = [all];
-        let w = Whitener::fit(&x, &segments, 1, 0.0);
+        let w = Whitener::fit(&x, &segments);
         assert!((w.ar[0] - 0.8).abs() < 0.03, "{w:?}");
         assert!((w.sigma - 25.0).abs() < 0.6, "{w:?}");
         let mut e = Vec::new();

@@ -3,6 +3,12 @@
 
 use core::ops::{Add, AddAssign, Div, Mul, Neg, Sub};
 
+/// A number that every column and every reader of a file can take.
+#[must_use]
+pub fn finite_or_zero(x: f64) -> f64 {
+    if x.is_finite() { x } else { 0.0 }
+}
+
 /// A scalar that the mechanisms' equations can be evaluated in.
 pub trait Number:
     Copy

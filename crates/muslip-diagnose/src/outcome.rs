@@ -6,7 +6,7 @@ use serde::Serialize;
 
 pub use crate::audit::finding::{Finding as ChainFinding, Word as ChainWord};
 use crate::mechanism::Reported;
-use crate::omnibus::finite_or_zero;
+use crate::number::finite_or_zero;
 use crate::prepare::DataFault;
 use crate::repaired::Repaired;
 
@@ -322,7 +322,10 @@ pub struct Diagnosis {
     /// Runs for plots; part of no file.
     #[serde(skip)]
     pub traces: Vec<Trace>,
-    /// The repaired model; a file of its own.
+    /// The repaired model; a file of its own. The base where what was named predicts unseen runs no better.
     #[serde(skip)]
     pub repaired: Repaired,
+    /// The model with all that was named, whether it predicts better or not; part of no file.
+    #[serde(skip)]
+    pub found: Repaired,
 }

@@ -3,19 +3,17 @@
 
 use core::ops::Range;
 
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use crate::campaign::Run;
-use crate::data::Data;
-use crate::fit::Problem;
 use crate::mechanism::Context;
 use crate::noise::{NoiseSize, Whitener, loss, whiteness};
-use crate::omnibus::finite_or_zero;
+use crate::number::finite_or_zero;
 use crate::outcome::{BeforeAfter, Score};
 use crate::prepare::{Series, prepare};
 use crate::repaired::{Repaired, RepairedError, Which};
 use crate::split;
-use crate::tyre_stage::TyreStage;
 
 /// What a likelihood of drag readings needs beside the model's prediction.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -29,19 +27,40 @@ pub struct Likelihood {
 }
 
 impl Likelihood {
-    pub(crate) fn new(size: NoiseSize, whitener: &Whitener) -> Self {
-        Self {
-            size,
-            colour: whitener.ar.clone(),
-            innovation_sigma: whitener.sigma,
+    /// Of what the repaired model leaves of what it was fitted to; `None` without a sample.
+    fn fitted(runs: &[Predicted], context: &Context) -> Option<Self> {
+        let (mut rest, mut depends_on) = (Vec::new(), Vec::new());
+        for (run, k) in runs.iter().flat_map(|run| run.samples(Kind::Fit)) {
+            rest.push(run.series.drag[k] - run.after[k]);
+            depends_on.push([run.after[k], run.series.slip_force_noise(k, context)]);
         }
+        if rest.is_empty() {
+            return None;
+        }
+        let size = NoiseSize::fitted(&rest, &depends_on);
+        // All runs as one, so that one autoregression is fitted to them.
+        let (mut all, mut segments) = (Vec::new(), Vec::new());
+        for run in runs {
+            let offset = all.len();
+            segments.extend(
+                run.segments(Kind::Fit)
+                    .map(|s| s.start + offset..s.end + offset),
+            );
+            let scaled = run.sizes(&size, context).zip(run.left(&run.after));
+            all.extend(scaled.map(|(size, left)| left / size));
+        }
+        let whitener = Whitener::fit(&all, &segments);
+        Some(Self {
+            size,
+            colour: whitener.ar,
+            innovation_sigma: whitener.sigma,
+        })
     }
 
     fn whitener(&self) -> Whitener {
         Whitener {
             ar: self.colour.clone(),
             sigma: self.innovation_sigma,
-            ..Whitener::unit()
         }
     }
 }
@@ -57,51 +76,82 @@ pub struct Proof {
     pub fresh: Option<BeforeAfter>,
 }
 
-/// One run under judgement: both residuals, the noise's size, and the stretches that count.
-struct Judged {
-    before: Vec<f64>,
-    after: Vec<f64>,
-    scale: Vec<f64>,
-    segments: Vec<Range<usize>>,
+/// Which figures a stretch of a recording enters.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Kind {
+    Fit,
+    Holdout,
+    Fresh,
 }
 
-/// Figures before and after over several runs; `None` without a sample.
-fn judge(runs: &[Judged], whitener: &Whitener) -> Option<BeforeAfter> {
-    let counted = runs.iter().any(|run| !run.segments.is_empty());
+/// A recording as prepared, the readings that both models expect, and which figures its stretches enter.
+pub(crate) struct Predicted {
+    pub(crate) series: Series,
+    /// By the base law alone, in N.
+    pub(crate) before: Vec<f64>,
+    /// By the repaired model, in N.
+    pub(crate) after: Vec<f64>,
+    kinds: Vec<(Kind, Vec<Range<usize>>)>,
+}
+
+impl Predicted {
+    fn segments(&self, kind: Kind) -> impl Iterator<Item = &Range<usize>> {
+        let own = self.kinds.iter().filter(move |own| own.0 == kind);
+        own.flat_map(|own| &own.1)
+    }
+
+    fn samples(&self, kind: Kind) -> impl Iterator<Item = (&Self, usize)> {
+        self.segments(kind)
+            .flat_map(Clone::clone)
+            .map(move |k| (self, k))
+    }
+
+    fn left(&self, expected: &[f64]) -> impl Iterator<Item = f64> {
+        self.series.drag.iter().zip(expected).map(|(y, f)| y - f)
+    }
+
+    /// Size of each reading's noise in N: it follows the repaired model's reading, as it does for whoever has its file
+    /// alone.
+    fn sizes(&self, size: &NoiseSize, context: &Context) -> impl Iterator<Item = f64> {
+        let force = self.after.iter().enumerate();
+        force.map(|(k, f)| size.sigma(*f, self.series.slip_force_noise(k, context)))
+    }
+}
+
+/// Figures before and after of what is of a kind; `None` without a sample.
+fn figures(
+    runs: &[Predicted],
+    kind: Kind,
+    likelihood: &Likelihood,
+    context: &Context,
+) -> Option<BeforeAfter> {
+    let whitener = likelihood.whitener();
+    let score_of = |expected: fn(&Predicted) -> &[f64]| {
+        let mut innovations = Vec::new();
+        let (mut square, mut count, mut log_scale) = (0.0, 0.0, 0.0);
+        for run in runs {
+            let left: Vec<f64> = run.left(expected(run)).collect();
+            let sizes: Vec<f64> = run.sizes(&likelihood.size, context).collect();
+            for (_, k) in run.samples(kind) {
+                square += left[k] * left[k];
+                log_scale += sizes[k].ln();
+                count += 1.0;
+            }
+            let scaled: Vec<f64> = left.iter().zip(&sizes).map(|(r, s)| r / s).collect();
+            let segments: Vec<Range<usize>> = run.segments(kind).cloned().collect();
+            whitener.apply(&scaled, &segments, &mut innovations);
+        }
+        score(square, count, log_scale, whitener.sigma, &innovations)
+    };
+    let counted = runs.iter().any(|run| run.segments(kind).next().is_some());
     counted.then(|| BeforeAfter {
-        before: judge_one(runs, whitener, |run| &run.before),
-        after: judge_one(runs, whitener, |run| &run.after),
+        before: score_of(|run| &run.before),
+        after: score_of(|run| &run.after),
     })
 }
 
-fn judge_one(runs: &[Judged], whitener: &Whitener, of: fn(&Judged) -> &[f64]) -> Score {
-    let mut innovations = Vec::new();
-    let (mut square, mut count, mut log_scale) = (0.0, 0.0, 0.0);
-    for run in runs {
-        let residual = of(run);
-        for k in run.segments.iter().flat_map(Clone::clone) {
-            square += residual[k] * residual[k];
-            log_scale += run.scale[k].ln();
-            count += 1.0;
-        }
-        let scaled: Vec<f64> = residual
-            .iter()
-            .zip(&run.scale)
-            .map(|(r, s)| r / s)
-            .collect();
-        whitener.apply(&scaled, &run.segments, &mut innovations);
-    }
-    score(square, count, log_scale, whitener.sigma, &innovations)
-}
-
 /// The figures of a balance from the sums over its samples and from its innovations.
-pub(crate) fn score(
-    square: f64,
-    count: f64,
-    log_scale: f64,
-    sigma: f64,
-    innovations: &[f64],
-) -> Score {
+fn score(square: f64, count: f64, log_scale: f64, sigma: f64, innovations: &[f64]) -> Score {
     if !(count > 0.0) {
         return Score::default();
     }
@@ -119,62 +169,6 @@ pub(crate) fn score(
     }
 }
 
-/// Figures of the tyre balance within a diagnosis: the noise's size follows the repaired model's reading, as it does
-/// for whoever has its file alone.
-pub(crate) fn of_stage(problem: &Problem<'_>, stage: &TyreStage) -> BeforeAfter {
-    let size = stage.noise.size.unwrap_or_default();
-    let runs: Vec<Judged> = problem
-        .runs
-        .iter()
-        .map(|&run| {
-            judged(
-                problem.data,
-                run,
-                &stage.base(problem.data, run),
-                &stage.repaired(problem.data, run),
-                &size,
-                problem.segments(run).to_vec(),
-            )
-        })
-        .collect();
-    judge(&runs, &stage.noise.whitener).unwrap_or_default()
-}
-
-fn judged(
-    data: &Data,
-    run: usize,
-    base: &[f64],
-    repaired: &[f64],
-    size: &NoiseSize,
-    segments: Vec<Range<usize>>,
-) -> Judged {
-    let series = &data.series[run];
-    let residual =
-        |model: &[f64]| -> Vec<f64> { series.drag.iter().zip(model).map(|(y, f)| y - f).collect() };
-    Judged {
-        before: residual(base),
-        after: residual(repaired),
-        scale: sizes(series, &data.context, repaired, size),
-        segments,
-    }
-}
-
-fn sizes(series: &Series, context: &Context, force: &[f64], size: &NoiseSize) -> Vec<f64> {
-    force
-        .iter()
-        .enumerate()
-        .map(|(k, f)| size.sigma(*f, series.slip_force_noise(k, context)))
-        .collect()
-}
-
-/// Which figures a stretch of a recording enters.
-#[derive(Clone, Copy, PartialEq, Eq)]
-enum Kind {
-    Fit,
-    Holdout,
-    Fresh,
-}
-
 impl Repaired {
     /// Size of a reading's noise before colour, row by row, for the drag that the model expects of a run, in N; what
     /// noise of the run's own speeds does to the prediction is counted in.
@@ -187,7 +181,12 @@ impl Repaired {
                 .collect();
         };
         let (series, _) = prepare(&self.rig, run, &[], 0, self.context.reach_factor);
-        sizes(&series, &self.context, expected_n, &likelihood.size)
+        let slip_noise = |k: usize| series.slip_force_noise(k, &self.context);
+        expected_n
+            .iter()
+            .enumerate()
+            .map(|(k, f)| likelihood.size.sigma(*f, slip_noise(k)))
+            .collect()
     }
 
     /// The figures of `diagnosis.json`, worked out again from recordings: those that the model was made from, in the
@@ -196,44 +195,64 @@ impl Repaired {
     /// # Errors
     /// [`RepairedError::NoLikelihood`] where the tyre balance was not fitted; else as for [`Repaired::predict`].
     pub fn prove(&self, runs: &[Run]) -> Result<Proof, RepairedError> {
+        let averaged = self.averaged.max(1);
+        let runs: Vec<Run> = runs.iter().map(|r| r.clone().averaged(averaged)).collect();
+        let (known, fresh): (Vec<Run>, Vec<Run>) =
+            runs.into_iter().partition(|run| self.known(run).is_some());
+        let mut proof = self.proof_of(&self.unseeing().predicted(&known)?)?;
+        proof.fresh = self.proof_of(&self.predicted(&fresh)?)?.fresh;
+        Ok(proof)
+    }
+
+    /// The same of recordings whose readings were predicted.
+    pub(crate) fn proof_of(&self, runs: &[Predicted]) -> Result<Proof, RepairedError> {
         let likelihood = self
             .noise
             .likelihood
             .as_ref()
             .ok_or(RepairedError::NoLikelihood)?;
-        let (mut fit, mut holdout, mut fresh) = (Vec::new(), Vec::new(), Vec::new());
-        for run in runs {
-            let run = run.clone().averaged(self.averaged.max(1));
-            let known = self.known(&run).map(|at| self.recordings[at].holdout);
-            let base = self.predict(&run, Which::Base)?.drag_force_n;
-            let repaired = self.predict(&run, Which::Repaired)?.drag_force_n;
-            let (series, _) = prepare(&self.rig, &run, &[], 0, self.context.reach_factor);
-            let data = self.data_of(series, Vec::new());
-            let whole = data.series[0].tyre.clone();
-            let samples = data.series[0].len();
-            let parts = match known {
-                None => vec![(Kind::Fresh, whole)],
-                Some(_) if self.proof_by_blocks => vec![
-                    (Kind::Fit, split::blocks(samples, &whole, false)),
-                    (Kind::Holdout, split::blocks(samples, &whole, true)),
-                ],
-                Some(true) => vec![(Kind::Holdout, whole)],
-                Some(false) => vec![(Kind::Fit, whole)],
-            };
-            for (kind, segments) in parts {
-                let part = judged(&data, 0, &base, &repaired, &likelihood.size, segments);
-                match kind {
-                    Kind::Fit => fit.push(part),
-                    Kind::Holdout => holdout.push(part),
-                    Kind::Fresh => fresh.push(part),
-                }
-            }
-        }
-        let whitener = likelihood.whitener();
+        let of = |kind| figures(runs, kind, likelihood, &self.context);
         Ok(Proof {
-            fit: judge(&fit, &whitener),
-            holdout: judge(&holdout, &whitener),
-            fresh: judge(&fresh, &whitener),
+            fit: of(Kind::Fit),
+            holdout: of(Kind::Holdout),
+            fresh: of(Kind::Fresh),
         })
+    }
+
+    /// Gives the model the noise of the drag readings that it leaves of what it was fitted to; none where that says
+    /// nothing of the tyre balance.
+    pub(crate) fn set_noise(&mut self, runs: &[Predicted]) {
+        self.noise.likelihood = Likelihood::fitted(runs, &self.context);
+        if let Some(likelihood) = &self.noise.likelihood {
+            self.noise.sigma_n = likelihood.size.typical;
+        }
+    }
+
+    /// What both models expect of recordings, averaged as the model's own were.
+    pub(crate) fn predicted(&self, runs: &[Run]) -> Result<Vec<Predicted>, RepairedError> {
+        runs.par_iter()
+            .map(|run| {
+                let known = self.known(run).map(|at| self.recordings[at].holdout);
+                let before = self.predict(run, Which::Base)?.drag_force_n;
+                let after = self.predict(run, Which::Repaired)?.drag_force_n;
+                let (series, _) = prepare(&self.rig, run, &[], 0, self.context.reach_factor);
+                let whole = series.tyre.clone();
+                let block = |proof| split::blocks(series.len(), &whole, proof);
+                let kinds = match known {
+                    None => vec![(Kind::Fresh, whole)],
+                    Some(_) if self.proof_by_blocks => {
+                        vec![(Kind::Fit, block(false)), (Kind::Holdout, block(true))]
+                    }
+                    Some(true) => vec![(Kind::Holdout, whole)],
+                    Some(false) => vec![(Kind::Fit, whole)],
+                };
+                Ok(Predicted {
+                    series,
+                    before,
+                    after,
+                    kinds,
+                })
+            })
+            .collect()
     }
 }

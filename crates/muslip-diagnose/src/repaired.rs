@@ -7,10 +7,10 @@ use serde::{Deserialize, Serialize};
 
 use crate::campaign::{Rig, Run};
 use crate::chain::correct::Lateness;
+use crate::correction::{Action, Levers, hat};
 use crate::data::{Catalogue, Data};
 use crate::mechanism::{Context, Parameter};
 use crate::model::{Model, Term, tyre};
-use crate::omnibus::{Action, Levers, hat};
 use crate::prepare::{Series, prepare};
 use crate::proof::Likelihood;
 use crate::variable::Variable;
@@ -103,9 +103,27 @@ pub struct KnownRecording {
     pub first_time_s: f64,
     /// Rows, to recognise the file by.
     pub samples: usize,
-    /// Whether it was kept for the proof.
+    /// Whether `proof` was made without it.
     #[serde(default)]
     pub holdout: bool,
+}
+
+/// What predicts: the base law alone, and the law with what was found beside it.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Predicting {
+    /// How late the channels are against the drag.
+    #[serde(default, skip_serializing_if = "Lateness::is_none")]
+    pub late: Lateness,
+    /// Base law alone.
+    pub base_alone: Vec<f64>,
+    /// The law in the repaired tyre model.
+    pub base: Vec<f64>,
+    /// Mechanisms of the tyre balance.
+    #[serde(default)]
+    pub tyre: Vec<RepairedTerm>,
+    /// Empirical corrections of the tyre balance.
+    #[serde(default)]
+    pub corrections: Vec<Correction>,
 }
 
 /// A repaired model.
@@ -149,6 +167,10 @@ pub struct Repaired {
     pub domain: Domain,
     /// Sizes that give the parameters their scale.
     pub context: Context,
+    /// What the same argument came to without the recordings, or their blocks, that are kept for the proof: it gives
+    /// the figures of the proof.
+    #[serde(default)]
+    pub proof: Predicting,
     /// Recordings that it was made from.
     #[serde(default)]
     pub recordings: Vec<KnownRecording>,
@@ -201,6 +223,56 @@ pub enum RepairedError {
 }
 
 impl Repaired {
+    /// What predicts.
+    #[must_use]
+    pub fn predicting(&self) -> Predicting {
+        Predicting {
+            late: self.late,
+            base_alone: self.base_alone.clone(),
+            base: self.base.clone(),
+            tyre: self.tyre.clone(),
+            corrections: self.corrections.clone(),
+        }
+    }
+
+    /// The model without what was found of the drag, here and in the proof.
+    #[must_use]
+    pub(crate) fn without_findings(&self) -> Self {
+        let alone = |base: &Vec<f64>| Predicting {
+            base_alone: base.clone(),
+            base: base.clone(),
+            ..Predicting::default()
+        };
+        Self {
+            late: Lateness::default(),
+            base: self.base_alone.clone(),
+            tyre: Vec::new(),
+            corrections: Vec::new(),
+            proof: alone(&self.proof.base_alone),
+            ..self.clone()
+        }
+    }
+
+    /// The model as it was made without what is kept for the proof.
+    #[must_use]
+    pub fn unseeing(&self) -> Self {
+        let Predicting {
+            late,
+            base_alone,
+            base,
+            tyre,
+            corrections,
+        } = self.proof.clone();
+        Self {
+            late,
+            base_alone,
+            base,
+            tyre,
+            corrections,
+            ..self.clone()
+        }
+    }
+
     /// Describes the terms of a fitted model.
     #[must_use]
     pub fn terms(

@@ -12,7 +12,6 @@ use super::estimate::{Job, tell};
 use super::terminal::Terminal;
 use crate::demo;
 use crate::diagnose::job;
-use crate::diagnose::job::Judge;
 use crate::diagnose::summary::{WIDEST_LINE, summary};
 use crate::estimate::{EstimateOptions, EstimatorKind};
 use crate::output::{create_folder, write_file};
@@ -89,7 +88,7 @@ fn find_concealed(folder: &Path, terminal: &mut Terminal) -> Result<(), Failure>
         write_file(&path, contents)?;
         recordings.push(path);
     }
-    let (diagnosis, views) = diagnosed(&rig, &recordings, &found, Judge::default())?;
+    let (diagnosis, views) = diagnosed(&rig, &recordings, &found)?;
     let shown: Vec<String> = recordings
         .iter()
         .map(|path| path.display().to_string())

@@ -4,13 +4,12 @@ use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
 use clap::Args;
-use muslip_diagnose::ablation::{Ablation, Part};
 use muslip_diagnose::outcome::Diagnosis;
 
 use super::Failure;
 use super::progress::Progress;
 use super::terminal::Terminal;
-use crate::diagnose::job::{self, Engine, Judge, WriteError};
+use crate::diagnose::job::{self, WriteError};
 use crate::diagnose::summary::{WIDEST_LINE, summary};
 use crate::diagnose::views::Views;
 use crate::diagnose::{load, page};
@@ -39,13 +38,6 @@ pub(super) struct Arguments {
     /// Print diagnosis.json and nothing else.
     #[arg(long)]
     json: bool,
-    /// Leave out a part of the argument, to measure what it is worth: remainder, errors-in-variables or
-    /// prefilter; may be repeated. For the trials of the documentation.
-    #[arg(long = "ablate", value_name = "PART", value_parser = part, hide = true)]
-    ablate: Vec<Part>,
-    /// Which engine judges: the one by innovations is being proven beside the one by residuals.
-    #[arg(long, value_enum, default_value_t, hide = true)]
-    engine: Engine,
     /// The recordings (CSV), one file a run.
     #[arg(value_name = "RUN.csv", required = true)]
     recordings: Vec<PathBuf>,
@@ -56,19 +48,8 @@ const STEPS: f64 = 1000.0;
 const READING: f64 = 100.0;
 
 pub(super) fn run(arguments: &Arguments, terminal: &mut Terminal) -> Result<(), Failure> {
-    let ablation = arguments
-        .ablate
-        .iter()
-        .try_fold(Ablation::default(), |ablation, part| {
-            ablation.without(*part)
-        })
-        .unwrap_or_default();
     let out = &arguments.out;
-    let judge = Judge {
-        engine: arguments.engine,
-        ablation,
-    };
-    let (diagnosis, views) = diagnosed(&arguments.rig, &arguments.recordings, out, judge)?;
+    let (diagnosis, views) = diagnosed(&arguments.rig, &arguments.recordings, out)?;
     let text = job::write(out, &diagnosis, &views, &command(arguments))?;
     if let Some(format) = arguments.format {
         let report = page::report(&diagnosis, &views, "");
@@ -95,7 +76,6 @@ pub(super) fn diagnosed(
     rig: &Path,
     recordings: &[PathBuf],
     out: &Path,
-    judge: Judge,
 ) -> Result<(Diagnosis, Views), Failure> {
     let bar = Mutex::new(Progress::new("read", STEPS as u64));
     let tell = |what: &str, steps: f64| {
@@ -107,24 +87,9 @@ pub(super) fn diagnosed(
         tell("read", READING * share);
     })?;
     job::prepare_folder(out)?;
-    Ok(job::run(campaign, judge, &|share, what| {
+    Ok(job::run(campaign, &|share, what| {
         tell(what, READING + (STEPS - READING) * share);
     }))
-}
-
-/// A part of the argument by its word, refused where the engine cannot do without it.
-fn part(word: &str) -> Result<Part, String> {
-    let part = Part::ALL
-        .into_iter()
-        .find(|part| part.word() == word)
-        .ok_or_else(|| {
-            let known: Vec<&str> = Part::ALL.iter().map(|part| part.word()).collect();
-            format!("not a part of the argument: one of {}", known.join(", "))
-        })?;
-    if Ablation::default().without(part).is_none() {
-        return Err("the engine cannot do without it yet".to_owned());
-    }
-    Ok(part)
 }
 
 /// The command that makes the report again, without where it goes.

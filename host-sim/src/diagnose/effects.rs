@@ -1,8 +1,9 @@
 //! Pictures of what each mechanism of a repaired model does, made from recordings.
 
 use muslip_diagnose::campaign::Run;
+use muslip_diagnose::chain::correct::Lateness;
 use muslip_diagnose::imbalance::{Against, Imbalance, Instant};
-use muslip_diagnose::mechanism::Balance;
+use muslip_diagnose::mechanism::{Balance, Id};
 use muslip_diagnose::outcome::Diagnosis;
 use muslip_diagnose::repaired::{Correction, Repaired, Which};
 
@@ -31,33 +32,57 @@ pub struct Effect {
     pub figures: Vec<Figure>,
 }
 
-/// The pictures of every mechanism of a diagnosis that the recordings kept can show.
+/// The pictures of every mechanism that was named and that the recordings kept can show.
 #[must_use]
 pub fn effects(diagnosis: &Diagnosis, runs: &[Run]) -> Vec<Effect> {
-    let repaired = &diagnosis.repaired;
-    let tyre = repaired.tyre.iter().enumerate().map(|(place, term)| {
-        let run = strongest(diagnosis, runs);
-        let figures = run.and_then(|run| on_drag(repaired, run, place));
-        (&term.id, figures.unwrap_or_default())
+    let found = &diagnosis.found;
+    let run = strongest(diagnosis, runs);
+    let tyre = found.tyre.iter().enumerate().map(|(place, term)| {
+        let figures =
+            run.and_then(|run| on_drag(found, &without_term(found, place), &term.id, run));
+        (term.id.as_str(), figures.unwrap_or_default())
     });
-    let dynamics = repaired
-        .dynamics
+    let delays = diagnosis
+        .mechanisms
         .iter()
-        .enumerate()
-        .map(|(place, term)| (&term.id, on_balance(repaired, runs, place, &term.id)));
-    tyre.chain(dynamics)
+        .filter(|named| Id::parse(named.id).is_some_and(is_delay_of_speed))
+        .map(|named| {
+            let without = Repaired {
+                late: Lateness::default(),
+                ..found.clone()
+            };
+            let figures = run.and_then(|run| on_drag(found, &without, named.id, run));
+            (named.id, figures.unwrap_or_default())
+        });
+    let dynamics = found.dynamics.iter().enumerate().map(|(place, term)| {
+        let figures = on_balance(found, runs, place, &term.id);
+        (term.id.as_str(), figures)
+    });
+    tyre.chain(delays)
+        .chain(dynamics)
         .map(|(id, figures)| Effect {
-            id: id.clone(),
+            id: id.to_owned(),
             figures,
         })
         .collect()
+}
+
+/// Whether a mechanism is in a model's timing and no term of it.
+fn is_delay_of_speed(id: Id) -> bool {
+    matches!(id, Id::WheelSpeedDelay | Id::VehicleSpeedDelay)
+}
+
+fn without_term(model: &Repaired, place: usize) -> Repaired {
+    let mut without = model.clone();
+    without.tyre.remove(place);
+    without
 }
 
 /// The picture of a model's first mechanism on one run; `None` where the run does not show it.
 pub(super) fn of_first(model: &Repaired, run: &Run) -> Option<Figure> {
     let figures = match model.dynamics.first() {
         Some(term) => on_balance(model, core::slice::from_ref(run), 0, &term.id),
-        None => on_drag(model, run, 0)?,
+        None => on_drag(model, &without_term(model, 0), &model.tyre.first()?.id, run)?,
     };
     figures.into_iter().next()
 }
@@ -75,16 +100,16 @@ fn strongest<'a>(diagnosis: &Diagnosis, runs: &'a [Run]) -> Option<&'a Run> {
         .or_else(|| runs.first())
 }
 
-/// What a mechanism of the tyre balance does to the drag: the stretch that shows it most, and the whole run.
-fn on_drag(repaired: &Repaired, run: &Run, place: usize) -> Option<Vec<Figure>> {
-    let with = Repaired {
-        corrections: Vec::new(),
-        ..repaired.clone()
+/// What a mechanism does to the drag: the stretch that shows it most, and the whole run.
+fn on_drag(with: &Repaired, without: &Repaired, id: &str, run: &Run) -> Option<Vec<Figure>> {
+    let drag = |model: &Repaired| {
+        let alone = Repaired {
+            corrections: Vec::new(),
+            ..model.clone()
+        };
+        Some(alone.predict(run, Which::Repaired).ok()?.drag_force_n)
     };
-    let mut without = with.clone();
-    let id = without.tyre.remove(place).id;
-    let drag = |model: &Repaired| Some(model.predict(run, Which::Repaired).ok()?.drag_force_n);
-    let (with_n, without_n) = (drag(&with)?, drag(&without)?);
+    let (with_n, without_n) = (drag(with)?, drag(without)?);
     let difference: Vec<f64> = with_n.iter().zip(&without_n).map(|(a, b)| a - b).collect();
     let (from, to) = most_shown(&run.time_s, &difference);
     let line = |values: &[f64], (from, to): (usize, usize)| -> Vec<(f64, f64)> {
@@ -92,7 +117,7 @@ fn on_drag(repaired: &Repaired, run: &Run, place: usize) -> Option<Vec<Figure>> 
         let points = run.time_s.iter().copied().zip(values.iter().copied());
         points.take(to).skip(from).step_by(stride).collect()
     };
-    let (name, recording) = (spoken(&id), short_name(&run.name));
+    let (name, recording) = (spoken(id), short_name(&run.name));
     let close_up = Figure::new(
         format!("The drag with {name} and without it, where {recording} shows it most."),
         Axis::new("time (s)"),

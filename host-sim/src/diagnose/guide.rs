@@ -2,13 +2,10 @@
 
 use std::fmt::Write as _;
 
-use muslip_diagnose::ablation::Ablation;
 use muslip_diagnose::campaign::Run;
 use muslip_diagnose::data::Data;
 use muslip_diagnose::mechanism::{Compensation, Id, Stage};
-use muslip_diagnose::repaired::{
-    Domain, NoiseModel, Repaired, RepairedError, RepairedParameter, RepairedTerm, Which,
-};
+use muslip_diagnose::repaired::{Repaired, RepairedError, RepairedParameter, RepairedTerm, Which};
 
 use super::effects;
 use super::load;
@@ -274,11 +271,8 @@ pub fn pictures() -> Result<Vec<(Id, Figure)>, GuideError> {
     let mut run = run_of(&scenario, &rows);
     let engine_rig = load::rig(&scenario.rig);
     let plain = Repaired {
-        late: muslip_diagnose::chain::correct::Lateness::default(),
         schema: "muslip.model/1".into(),
         averaged: 1,
-        proof_by_blocks: false,
-        base_alone: Vec::new(),
         base: vec![
             scenario.rig.tyre.peak_friction.ln(),
             scenario.rig.tyre.critical_slip.ln(),
@@ -286,21 +280,9 @@ pub fn pictures() -> Result<Vec<(Id, Figure)>, GuideError> {
             0.0,
             0.0,
         ],
-        tyre: Vec::new(),
-        dynamics: Vec::new(),
-        corrections: Vec::new(),
-        covariance: Vec::new(),
-        dynamics_covariance: Vec::new(),
-        noise: NoiseModel::default(),
-        domain: Domain::default(),
-        context: Data::new(
-            &engine_rig,
-            core::slice::from_ref(&run),
-            Ablation::default(),
-        )
-        .context,
-        recordings: Vec::new(),
+        context: Data::new(&engine_rig, core::slice::from_ref(&run)).context,
         rig: engine_rig,
+        ..Repaired::default()
     };
     for (force, time) in run.normal_force_n.iter_mut().zip(&run.time_s) {
         *force *= 1.0 + SWING.0 * (std::f64::consts::TAU * SWING.1 * time).sin();

@@ -3,9 +3,7 @@
 use std::io::Write as _;
 use std::path::Path;
 
-use muslip_diagnose::ablation::Ablation;
-use muslip_diagnose::answer;
-use muslip_diagnose::diagnose::diagnose_without;
+use muslip_diagnose::diagnose::diagnose;
 use muslip_diagnose::outcome::{Diagnosis, Fault};
 
 use super::load::Campaign;
@@ -32,38 +30,12 @@ pub enum WriteError {
     Text(String),
 }
 
-/// Which engine judges.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
-pub enum Engine {
-    /// By residuals on smoothed channels.
-    #[default]
-    Residuals,
-    /// By innovations of the balances in level form, the measuring chain first.
-    Innovations,
-}
-
-/// Who judges, and what is left out of the argument.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Judge {
-    /// Which engine.
-    pub engine: Engine,
-    /// What the engine by residuals leaves out.
-    pub ablation: Ablation,
-}
-
 /// Runs the engine on a campaign, which is given up to it but for what the report shows. What had to be mended to read them joins the faults of the data.
 #[must_use]
-pub fn run(
-    campaign: Campaign,
-    judge: Judge,
-    progress: &(dyn Fn(f64, &str) + Sync),
-) -> (Diagnosis, Views) {
+pub fn run(campaign: Campaign, progress: &(dyn Fn(f64, &str) + Sync)) -> (Diagnosis, Views) {
     let Campaign { rig, runs, faults } = campaign;
     let kept = Kept::of(&runs);
-    let mut diagnosis = match judge.engine {
-        Engine::Residuals => diagnose_without(&rig, runs, judge.ablation, progress),
-        Engine::Innovations => answer::diagnose(&rig, &runs, progress),
-    };
+    let mut diagnosis = diagnose(&rig, runs, progress);
     let views = Views::of(&diagnosis, &kept);
     add_faults(&mut diagnosis, faults);
     json::make_finite(&mut diagnosis);

@@ -4,11 +4,11 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use muslip_diagnose::campaign::Rig;
+use muslip_diagnose::correction::Action;
 use muslip_diagnose::data::Catalogue;
 use muslip_diagnose::mechanism::Context;
 use muslip_diagnose::model::TYRE_BASE;
-use muslip_diagnose::omnibus::Action;
-use muslip_diagnose::repaired::{Correction, NoiseModel, Repaired, RepairedTerm};
+use muslip_diagnose::repaired::{Correction, NoiseModel, Predicting, Repaired, RepairedTerm};
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
@@ -254,6 +254,7 @@ fn complaint(model: &Repaired) -> Option<Complaint> {
         .or_else(|| terms_complaint("tyre", &model.tyre, &model.context))
         .or_else(|| terms_complaint("dynamics", &model.dynamics, &model.context))
         .or_else(|| corrections_complaint(&model.corrections))
+        .or_else(|| proof_complaint(model))
         .or_else(|| noise_complaint(&model.noise))
         .or_else(|| context_complaint(&model.context))
 }
@@ -424,6 +425,21 @@ fn corrections_complaint(corrections: &[Correction]) -> Option<Complaint> {
         }
     }
     None
+}
+
+/// The first thing that cannot be run in the model that the proof is by, where there is one.
+fn proof_complaint(model: &Repaired) -> Option<Complaint> {
+    let proof = &model.proof;
+    if *proof == Predicting::default() {
+        return None;
+    }
+    let complaint = base_complaint("base_alone", &proof.base_alone)
+        .or_else(|| base_complaint("base", &proof.base))
+        .or_else(|| terms_complaint("tyre", &proof.tyre, &model.context))
+        .or_else(|| corrections_complaint(&proof.corrections))?;
+    let mut key = way!["proof"];
+    key.extend(complaint.key);
+    Some(Complaint { key, ..complaint })
 }
 
 fn context_complaint(context: &Context) -> Option<Complaint> {

@@ -228,11 +228,7 @@ fn findings(diagnosis: &Diagnosis, views: &Views) -> Section {
     let mut blocks = Vec::new();
     for mechanism in &diagnosis.mechanisms {
         blocks.push(Block::Paragraph(mechanism_sentence(mechanism)));
-        let mut terms = diagnosis
-            .repaired
-            .tyre
-            .iter()
-            .chain(&diagnosis.repaired.dynamics);
+        let mut terms = diagnosis.found.tyre.iter().chain(&diagnosis.found.dynamics);
         let term = terms.find(|term| term.id == mechanism.id);
         blocks.push(mechanism_table(mechanism, term));
         blocks.push(Block::Link {

@@ -13,10 +13,10 @@ use std::sync::Arc;
 
 use muslip::law::Rudd;
 use muslip_diagnose::campaign::Run;
+use muslip_diagnose::correction::{Action, Levers};
 use muslip_diagnose::data::{Catalogue, Data};
 use muslip_diagnose::mechanism::{Id, Mechanism, Stage, State};
 use muslip_diagnose::model::{Model, tyre};
-use muslip_diagnose::omnibus::{Action, Levers};
 use muslip_diagnose::prepare::{Channel as Prepared, Series};
 use muslip_diagnose::repaired::{Repaired, RepairedError, Which};
 

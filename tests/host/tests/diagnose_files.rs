@@ -429,29 +429,6 @@ fn json_is_printed_alone_and_is_the_file() {
 }
 
 #[test]
-fn without_the_remainder_nothing_is_said_of_what_no_mechanism_explains() {
-    // A hum that is none of the mechanisms.
-    let humming = |_| -> Box<dyn FnMut(f64, f64) -> f64> {
-        let mut time = 0.0;
-        Box::new(move |dt, drag| {
-            time += dt;
-            drag + 250.0 * (std::f64::consts::TAU * 11.0 * time).sin()
-        })
-    };
-    let scratch = bench(&campaign(1..6, humming));
-    let seen = names(5);
-    let left = |more: &[&str]| -> usize {
-        scratch.output(&arguments(&seen, more));
-        let value: Value = serde_json::from_str(&scratch.read("found/diagnosis.json")).unwrap();
-        value["unexplained"].as_array().unwrap().len()
-    };
-    assert_eq!(left(&[]), 1);
-    assert_eq!(left(&["--ablate", "remainder"]), 0);
-    let complaint = scratch.complaint(&arguments(&seen, &["--ablate", "everything"]));
-    assert!(complaint.contains("one of remainder"), "{complaint}");
-}
-
-#[test]
 fn a_folder_that_cannot_be_made_is_told_before_the_work() {
     let scratch = bench(&campaign(1..2, faithful));
     scratch.write("found", "a file");

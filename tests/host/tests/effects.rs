@@ -105,7 +105,7 @@ fn a_balance_lacks_what_its_mechanism_supplies() {
 fn every_mechanism_has_a_picture() {
     let pictured = |model: Repaired, runs: &[Run]| -> Vec<(String, usize)> {
         let diagnosis = Diagnosis {
-            repaired: model,
+            found: model,
             ..partly_explained()
         };
         effects(&diagnosis, runs)

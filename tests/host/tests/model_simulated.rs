@@ -175,7 +175,7 @@ fn a_recording_that_the_model_has_never_seen_is_scored_as_such() {
 }
 
 #[test]
-fn a_replay_without_noise_is_the_prediction_and_gives_the_report_s_error() {
+fn a_replay_without_noise_is_the_prediction_and_has_the_error_that_is_scored() {
     let bench = Bench::lagging(5);
     let run = bench.held_out();
     let told = bench.simulate("replay.csv", &["--inputs", run, "--no-noise"]);
@@ -201,11 +201,15 @@ fn a_replay_without_noise_is_the_prediction_and_gives_the_report_s_error() {
         .iter()
         .zip(recorded.drag())
         .map(|(a, b)| a - b));
-    let reported = number(&bench.diagnosis, "fit.holdout.after.rmse_n");
-    assert!(
-        (rmse - reported).abs() < 1e-9 * reported,
-        "{rmse} {reported}"
+    // The report's figure is that of the model made without this run; this model is scored on the run by another name.
+    bench.scratch.write("renamed.csv", bench.scratch.read(run));
+    let scored = number(
+        &bench.score("rig.toml", &["renamed.csv"]),
+        "fresh.after.rmse_n",
     );
+    assert!((rmse - scored).abs() < 1e-9 * scored, "{rmse} {scored}");
+    let reported = number(&bench.diagnosis, "fit.holdout.after.rmse_n");
+    assert!((rmse / reported - 1.0).abs() < 0.05, "{rmse} {reported}");
 }
 
 #[test]

@@ -2,7 +2,6 @@
 
 use super::correct::{Lateness, TimingStd};
 use super::held::without_holds;
-use crate::ablation::Ablation;
 use crate::audit::{Audit, Timing as Late};
 use crate::campaign::{Rig, Run};
 use crate::data::Data;
@@ -11,12 +10,16 @@ use crate::innovations::gram::{solve, total};
 use crate::innovations::hypothesis::{Effort, Guess, Judged, judge, noise_stride};
 use crate::innovations::slip::reconciled;
 use crate::model::Model;
+use crate::prepare::{Channel, Series};
+use crate::split::Split;
 
 /// How late the channels are against the drag channel, with what is not known of it.
 #[derive(Clone, Debug, Default)]
 pub struct Timing {
     /// What is taken off.
     pub late: Lateness,
+    /// What was found before any of it was left to be explained.
+    found: Lateness,
     /// Of the wheel speed, at its mean.
     pub wheel: Late,
     /// Of the vehicle speed.
@@ -87,11 +90,13 @@ const LEAST_DRAG_LATE_S: f64 = 2e-3;
 /// Least time in s by which a brake is read before its torque that no filters of the channels account for.
 const LEAST_BRAKE_EARLY_S: f64 = 0.02;
 /// Largest standard deviation in s of a lateness that says anything of the drag's.
-const VAGUE_S: f64 = 4e-3;
+const VAGUE_S: f64 = 2e-3;
 /// Standard deviations that timing may be off by without being seen.
 const UNKNOWN_STDS: f64 = 3.0;
 /// Best to which timing is ever known, in s.
 const LEAST_STD_S: f64 = 5e-4;
+/// Least share of a speed's rate that is taken for the speed's.
+const LEAST_RELIABLE: f64 = 0.02;
 /// A shift that matters no more, in s.
 const SMALL_SHIFT_S: f64 = 1e-4;
 
@@ -119,16 +124,34 @@ pub fn averaging(runs: &[Run]) -> usize {
 }
 
 /// The campaign with its channels brought to the drag's time; what was held is drawn as lines already.
-fn at_one_time(rig: &Rig, runs: &[Run], averaged: usize, late: Lateness, audit: &Audit) -> Data {
+fn at_one_time(
+    rig: &Rig,
+    runs: &[Run],
+    averaged: usize,
+    late: Lateness,
+    audit: &Audit,
+    split: &Split,
+) -> Data {
     let corrected: Vec<Run> = runs
         .iter()
         .map(|r| late.shifted(r).only(&late.known(r)))
         .collect();
-    let mut data = Data::new(rig, &corrected, Ablation::default());
+    let mut data = Data::new(rig, &corrected);
     data.averaged = averaged;
+    split.take_out(&mut data.series);
     data.blocks = blocks(&data);
     data.timing_std = known_to(audit);
     data
+}
+
+/// Fewest samples of all balances that anything can be said of.
+const LEAST_USABLE: usize = 60;
+
+/// Samples that enter a balance.
+fn usable(data: &Data) -> usize {
+    let balances = |s: &Series| [&s.tyre, &s.wheel_balance, &s.vehicle_balance].map(Clone::clone);
+    let series = data.series.iter();
+    series.flat_map(balances).flatten().map(|s| s.len()).sum()
 }
 
 /// How well the audit knows the timing.
@@ -159,9 +182,16 @@ fn within(known: &Late, value: f64) -> f64 {
     }
 }
 
-/// Brings the channels to the drag channel's time and fits the base law to them.
+/// Brings the channels to the drag channel's time and fits the base law to them, by what is not kept for the proof.
+/// `start` is where the search for the timing starts, where that is known better than from the audit.
 #[must_use]
-pub fn timed(rig: &Rig, runs: &[Run], audit: &Audit) -> Option<(Data, Timing, Judged)> {
+pub fn timed(
+    rig: &Rig,
+    runs: &[Run],
+    audit: &Audit,
+    split: &Split,
+    start: Option<&Timing>,
+) -> Option<(Data, Timing, Judged)> {
     let averaged = averaging(runs);
     let runs: Vec<Run> = runs
         .iter()
@@ -169,13 +199,21 @@ pub fn timed(rig: &Rig, runs: &[Run], audit: &Audit) -> Option<(Data, Timing, Ju
         .collect();
     let mut timing = Timing::default();
     let known = |t: &Late| if t.std.is_finite() { t.value } else { 0.0 };
-    timing.late.wheel = known(&audit.wheel_late);
-    timing.late.vehicle = known(&audit.vehicle_late);
-    timing.late.brake = known(&audit.brake_late);
+    match start {
+        Some(start) => timing.late = start.found,
+        None => {
+            timing.late.wheel = known(&audit.wheel_late);
+            timing.late.vehicle = known(&audit.vehicle_late);
+            timing.late.brake = known(&audit.brake_late);
+        }
+    }
     let mut model = Model::of_law(rig.peak_friction, rig.critical_slip);
     let mut guess = None;
     for pass in 0..=PASSES {
-        let data = at_one_time(rig, &runs, averaged, timing.late, audit);
+        let data = at_one_time(rig, &runs, averaged, timing.late, audit, split);
+        if usable(&data) < LEAST_USABLE {
+            return None;
+        }
         timing.late.turn = data.context.mean_wheel_speed;
         let last = pass == PASSES;
         let effort = Effort {
@@ -185,7 +223,7 @@ pub fn timed(rig: &Rig, runs: &[Run], audit: &Audit) -> Option<(Data, Timing, Ju
         };
         let before = guess.as_deref().map(Guess::of);
         let judged = judge(&data, &model, &[], before, effort)?;
-        let (shift, std) = shifts(&judged)?;
+        let (shift, std) = shifts(&data, &judged)?;
         let late = &timing.late;
         let [wheel, vehicle, brake] = [
             late.wheel + late.wheel_by_turn + shift[0] + shift[3],
@@ -209,6 +247,7 @@ pub fn timed(rig: &Rig, runs: &[Run], audit: &Audit) -> Option<(Data, Timing, Ju
         if last || (small && pass >= 2) {
             // A drag later than all others, or a brake's reading before its torque, is physics to be told apart:
             // delay, lag or what else keeps it back.
+            timing.found = timing.late;
             let drag = timing.drag_late();
             timing.leave(drag.unwrap_or(0.0));
             let brake = timing.brake_early();
@@ -217,7 +256,7 @@ pub fn timed(rig: &Rig, runs: &[Run], audit: &Audit) -> Option<(Data, Timing, Ju
             }
             let (mut data, mut judged) = (data, judged);
             if drag.is_some() || brake {
-                data = at_one_time(rig, &runs, averaged, timing.late, audit);
+                data = at_one_time(rig, &runs, averaged, timing.late, audit, split);
                 if brake {
                     // What is to be explained is not to be explained away.
                     data.timing_std.brake = LEAST_STD_S;
@@ -251,9 +290,24 @@ pub fn timed(rig: &Rig, runs: &[Run], audit: &Audit) -> Option<(Data, Timing, Ju
     None
 }
 
+/// Share of a speed's rate that is the speed's, and not noise of its reading, by mean squares: a shift by a noisy rate
+/// comes out smaller by that much.
+fn reliability(data: &Data, channel: fn(&Series) -> &Channel) -> f64 {
+    let (mut all, mut noise) = (0.0, 0.0);
+    for s in &data.series {
+        let own = channel(s);
+        for k in (0..s.len()).filter(|k| own.rate[*k].is_finite()) {
+            all += own.rate[k] * own.rate[k];
+            // Slope of a straight line through as many readings as make up the share.
+            noise += 12.0 * own.sigma.powi(2) * own.variance_share[k].powi(3) / s.dt[k].powi(2);
+        }
+    }
+    (1.0 - noise / all).max(LEAST_RELIABLE)
+}
+
 /// Shifts that are still asked for (wheel, vehicle, brake, wheel by turn), and the standard deviations of the first
 /// three from the spread over runs or from the noise, whichever is larger.
-fn shifts(judged: &Judged) -> Option<([f64; 4], [f64; 3])> {
+fn shifts(data: &Data, judged: &Judged) -> Option<([f64; 4], [f64; 3])> {
     let sum = total(&judged.grams);
     let n = sum.products.nrows();
     let chosen: Vec<usize> = (1..n).collect();
@@ -271,6 +325,11 @@ fn shifts(judged: &Judged) -> Option<([f64; 4], [f64; 3])> {
         })
         .collect();
     let r = runs.len() as f64;
+    let reliable = [
+        reliability(data, |s| &s.wheel),
+        reliability(data, |s| &s.speed),
+        1.0,
+    ];
     let std = core::array::from_fn(|i| {
         let mean = runs.iter().map(|x| x[i]).sum::<f64>() / r;
         let jackknife =
@@ -280,7 +339,9 @@ fn shifts(judged: &Judged) -> Option<([f64; 4], [f64; 3])> {
             0 => c(0, 0) + c(3, 3) + 2.0 * c(0, 3),
             _ => c(i, i),
         };
-        jackknife.max(own.max(0.0).sqrt())
+        jackknife.max(own.max(0.0).sqrt()) / reliable[i]
     });
-    Some((core::array::from_fn(|i| all.coefficients[first + i]), std))
+    let of = [reliable[0], reliable[1], reliable[2], reliable[0]];
+    let shift = core::array::from_fn(|i| all.coefficients[first + i] / of[i]);
+    Some((shift, std))
 }

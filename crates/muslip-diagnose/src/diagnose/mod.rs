@@ -1,27 +1,31 @@
-//! The whole argument: residuals, noise, screening, location, joint fit, choice, proof, remainder.
+//! The result of a diagnosis by innovations, put together from what each stage found.
 
-mod channels;
+mod figures;
 mod located;
 mod model_out;
 mod named;
-mod scores;
+
+use std::collections::BTreeMap;
+
+use self::figures::{fit_of, traces};
+use self::named::DELAYS;
 
 use nalgebra::DMatrix;
 
-use crate::ablation::Ablation;
-use crate::audit::{Finding, audit};
+use crate::audit::{Audit, audit};
 use crate::campaign::{Rig, Run};
-use crate::choose::Limits;
-use crate::confidence::covariance;
+use crate::chain::timing::{Timing, timed};
 use crate::data::Data;
-use crate::dynamics_stage::{self, DynamicsStage};
-use crate::fit::{Joint, Problem};
-use crate::looked::looked_for;
-use crate::mechanism::Balance;
-use crate::model::Model;
-use crate::outcome::{Diagnosis, NamedMechanism, Recording, Role, Verdict};
+use crate::decide::{Decision, decide, through_force};
+use crate::innovations::dependence::Dependence;
+use crate::innovations::hypothesis::Judged;
+use crate::mechanism::{Balance, Id};
+use crate::model::{Model, TYRE_BASE};
+use crate::number::finite_or_zero;
+use crate::outcome::{Diagnosis, Estimate, Fault, Fit, LookedFor, Recording, Role, Verdict};
+use crate::prepare::Series;
+use crate::repaired::{Predicting, Repaired};
 use crate::split::Split;
-use crate::tyre_stage::{self, TyreStage};
 
 /// Called with the share of the work done (0..=1) and what is being done.
 pub type Progress<'a> = &'a (dyn Fn(f64, &str) + Sync);
@@ -30,199 +34,305 @@ pub type Progress<'a> = &'a (dyn Fn(f64, &str) + Sync);
 /// but the fastest effects.
 const MOST_SAMPLES: usize = 300_000;
 
-/// Diagnoses a campaign of recordings. Deterministic: the same input gives the same result, whatever
-/// the number of threads. The recordings are given up, so that long ones need not stay in memory.
+/// Diagnoses a campaign of recordings: the measuring chain first, then physics on innovations. Deterministic: the
+/// same input gives the same result, whatever the number of threads. The recordings are given up, so that long ones
+/// need not stay in memory.
 #[must_use]
 pub fn diagnose(rig: &Rig, runs: Vec<Run>, progress: Progress<'_>) -> Diagnosis {
-    diagnose_without(rig, runs, Ablation::default(), progress)
-}
-
-/// The same with parts of the argument left out.
-#[must_use]
-pub fn diagnose_without(
-    rig: &Rig,
-    runs: Vec<Run>,
-    ablation: Ablation,
-    progress: Progress<'_>,
-) -> Diagnosis {
     progress(0.0, "cleaning and smoothing the recordings");
     let total: usize = runs.iter().map(Run::len).sum();
     let averaged = total.div_ceil(MOST_SAMPLES).max(1);
     // One after the other, so that the long recordings do not outlive their means.
     let runs: Vec<Run> = runs.into_iter().map(|run| run.averaged(averaged)).collect();
-    // The measuring chain first: what it does is told beside any physics.
-    let chain_findings = audit(rig, &runs).findings;
-    let mut data = Data::new(rig, &runs, ablation);
-    data.averaged = averaged;
-    let split = Split::new(&data);
-    let limits = Limits {
-        ablation,
-        ..Limits::default()
+    let given = Given {
+        data: Data::new(rig, &runs),
+        rig,
+        runs: &runs,
+        averaged,
     };
-    let tyre = tyre_stage::analyse(&data, &runs, &split, &limits, &progress);
-    progress(0.75, "wheel and vehicle");
-    let chain = tyre
-        .as_ref()
-        .and_then(|t| tyre_stage::chain(&data, &t.model));
-    let dynamics = dynamics_stage::analyse(&data, &split, &limits.for_dynamics(), chain.as_deref());
-    progress(0.85, "proof and report");
-    let outcome = Outcome {
-        data: &data,
-        split: &split,
-        limits: &limits,
-        tyre: tyre.as_ref(),
-        dynamics: dynamics.as_ref(),
-        chain: chain.as_deref(),
-        chain_findings,
-    }
-    .assemble();
+    progress(0.1, "auditing the measuring chain");
+    let audit = audit(rig, &runs);
+    progress(0.2, "weighing mechanisms");
+    let nothing_kept = Split::default();
+    let Some(answer) = Answer::of(&given, &nothing_kept, &audit, None) else {
+        return given.undecided(audit);
+    };
+    progress(0.6, "the same again without what is kept for the proof");
+    let kept = Split::new(&given.data);
+    let proof = if answer.found_nothing() {
+        Predicting {
+            base_alone: given.plain_law(&kept),
+            base: given.plain_law(&kept),
+            ..Predicting::default()
+        }
+    } else {
+        let again = Answer::of(&given, &kept, &audit, Some(&answer.timing));
+        again.map_or_else(Predicting::default, |again| again.repaired().predicting())
+    };
+    progress(0.9, "report");
+    let diagnosis = answer.assemble(&kept, proof);
     progress(1.0, "done");
-    outcome
+    diagnosis
 }
 
-struct Outcome<'a> {
-    data: &'a Data,
-    split: &'a Split,
-    limits: &'a Limits,
-    tyre: Option<&'a TyreStage>,
-    dynamics: Option<&'a DynamicsStage>,
-    chain: Option<&'a [Vec<f64>]>,
-    chain_findings: Vec<Finding>,
+/// What was given, as it was recorded.
+struct Given<'a> {
+    rig: &'a Rig,
+    runs: &'a [Run],
+    /// Samples of the recordings that are one here.
+    averaged: usize,
+    data: Data,
 }
 
-impl Outcome<'_> {
-    fn tyre_joint<'b>(&'b self, stage: &'b TyreStage, proof: bool) -> Joint<'b> {
-        let mut problem = tyre_stage::problem(self.data, self.split, &stage.noise);
-        if proof {
-            problem.runs = &self.split.proof_runs;
-            problem.segments = self.split.proof.of(Balance::Tyre);
-        }
-        Joint {
-            parts: vec![problem],
-        }
+impl Given<'_> {
+    /// The law fitted to the channels as recorded by plain least squares, by what is not kept.
+    fn plain_law(&self, kept: &Split) -> Vec<f64> {
+        let mut series = self.data.series.clone();
+        kept.take_out(&mut series);
+        crate::law::plain(&self.data, &series).base
     }
 
-    fn dynamics_joint<'b>(&'b self, stage: &'b DynamicsStage, proof: bool) -> Joint<'b> {
-        let (runs, segments) = if proof {
-            (&self.split.proof_runs, &self.split.proof)
-        } else {
-            (&self.split.fit_runs, &self.split.fit)
+    fn undecided(&self, audit: Audit) -> Diagnosis {
+        let rig = self.rig;
+        let estimate = |value: f64| Estimate { value, std: value };
+        let law = Model::of_law(rig.peak_friction, rig.critical_slip).base;
+        let repaired = Repaired {
+            schema: "muslip.model/1".to_owned(),
+            rig: rig.clone(),
+            base_alone: law.clone(),
+            base: law,
+            context: self.data.context.clone(),
+            ..Repaired::default()
         };
-        Joint {
-            parts: stage
-                .noise
+        Diagnosis {
+            schema: "muslip.diagnosis/1",
+            verdict: Verdict::Undecided,
+            recordings: self.recordings(&Split::default()),
+            noise: BTreeMap::new(),
+            base: [
+                ("peak_friction".to_owned(), estimate(rig.peak_friction)),
+                ("critical_slip".to_owned(), estimate(rig.critical_slip)),
+            ]
+            .into(),
+            r#where: Vec::new(),
+            regions: Vec::new(),
+            mechanisms: Vec::new(),
+            unexplained: Vec::new(),
+            looked_for: Id::ALL
                 .iter()
-                .map(|(balance, noise)| Problem {
-                    data: self.data,
-                    balance: *balance,
-                    noise,
-                    runs,
-                    segments: segments.of(*balance),
-                    chain: self.chain,
+                .map(|id| LookedFor {
+                    id: id.as_str(),
+                    identifiable: false,
+                    minimum_detectable: None,
                 })
                 .collect(),
+            data_faults: self.faults(&Split::default()),
+            chain: audit.findings,
+            fit: Fit::default(),
+            caveats: Vec::new(),
+            traces: Vec::new(),
+            found: repaired.clone(),
+            repaired,
         }
     }
 
-    fn assemble(&self) -> Diagnosis {
-        let mut mechanisms: Vec<(f64, NamedMechanism)> = Vec::new();
-        let mut tyre_covariance = DMatrix::zeros(0, 0);
-        let mut dynamics_covariance = DMatrix::zeros(0, 0);
-        if let Some(stage) = self.tyre {
-            let joint = self.tyre_joint(stage, false);
-            tyre_covariance = covariance(&joint, &stage.search.chosen.fitted);
-            let proof = self.tyre_joint(stage, true);
-            mechanisms.extend(self.named(&joint, &proof, &stage.search, &tyre_covariance));
+    fn recordings(&self, split: &Split) -> Vec<Recording> {
+        let role = |run: usize| {
+            if split.keeps_whole(run) {
+                Role::Holdout
+            } else {
+                Role::Fit
+            }
+        };
+        self.runs
+            .iter()
+            .enumerate()
+            .map(|(run, r)| Recording {
+                path: r.name.clone(),
+                samples: r.len() * self.averaged,
+                role: role(run),
+            })
+            .collect()
+    }
+
+    fn faults(&self, split: &Split) -> Vec<Fault> {
+        let mut faults: Vec<Fault> = self.data.faults.iter().map(Fault::from).collect();
+        let series = &self.data.series;
+        let told = |name: &str| {
+            let mut known = self.data.faults.iter();
+            known.any(|f| f.recording == name && f.channel == "drag_force_n")
+        };
+        let few = |s: &&Series| s.tyre_count() < LEAST_OF_TYRE && !told(&s.name);
+        for s in series.iter().filter(few) {
+            faults.push(Fault {
+                recording: s.name.clone(),
+                channel: "drag_force_n".to_owned(),
+                start_s: finite_or_zero(s.time.first().copied().unwrap_or(0.0)),
+                end_s: finite_or_zero(s.time.last().copied().unwrap_or(0.0)),
+                what: "too few usable samples for the tyre balance".to_owned(),
+            });
         }
-        if let Some(stage) = self.dynamics {
-            let joint = self.dynamics_joint(stage, false);
-            dynamics_covariance = covariance(&joint, &stage.search.chosen.fitted);
-            let proof = self.dynamics_joint(stage, true);
-            mechanisms.extend(self.named(&joint, &proof, &stage.search, &dynamics_covariance));
+        if split.by_block {
+            faults.push(Fault {
+                recording: series.first().map_or(String::new(), |s| s.name.clone()),
+                channel: "time_s".to_owned(),
+                start_s: 0.0,
+                end_s: 0.0,
+                what: format!(
+                    "{} recording(s): fewer than four, so the proof is by blocks of the same runs",
+                    series.len()
+                ),
+            });
         }
-        mechanisms.sort_by(|a, b| b.0.total_cmp(&a.0));
-        let mechanisms: Vec<NamedMechanism> = mechanisms.into_iter().map(|(_, m)| m).collect();
+        faults
+    }
+}
+
+/// Fewest samples of a run from which its tyre balance says anything.
+const LEAST_OF_TYRE: usize = 30;
+
+/// What the argument came to, made without what is kept.
+struct Answer<'a> {
+    given: &'a Given<'a>,
+    kept: &'a Split,
+    audit: &'a Audit,
+    data: Data,
+    timing: Timing,
+    decision: Decision,
+}
+
+impl<'a> Answer<'a> {
+    /// The argument; `None` where nothing usable is left.
+    fn of(
+        given: &'a Given<'a>,
+        kept: &'a Split,
+        audit: &'a Audit,
+        timing: Option<&Timing>,
+    ) -> Option<Self> {
+        let (data, timing, base) = timed(given.rig, given.runs, audit, kept, timing)?;
+        // Delays of the speeds are the chain's: they are named by what the timing shows.
+        let decision = decide(&data, base, &DELAYS, timing.off_by());
+        Some(Self {
+            given,
+            kept,
+            audit,
+            data,
+            timing,
+            decision,
+        })
+    }
+
+    fn found_nothing(&self) -> bool {
+        let chosen = &self.decision.chosen;
+        chosen.model.terms.is_empty() && chosen.extra.is_empty() && self.named_delays().is_empty()
+    }
+
+    /// The diagnosis, proven by what the argument came to without what was kept for that.
+    fn assemble(&self, kept: &Split, proof: Predicting) -> Diagnosis {
+        let mut mechanisms = self.named();
+        mechanisms.extend(self.named_delays());
+        let mut found = self.repaired();
+        found.proof = proof;
+        found.proof_by_blocks = kept.by_block;
+        for (run, recording) in found.recordings.iter_mut().enumerate() {
+            recording.holdout = kept.keeps_whole(run);
+        }
+        let predicted = found
+            .unseeing()
+            .predicted(self.given.runs)
+            .unwrap_or_default();
+        found.set_noise(&predicted);
+        let fit = fit_of(&found, &predicted);
+        // A model that says nothing of the drag predicts it as the base does.
+        let says_something =
+            !found.tyre.is_empty() || !found.corrections.is_empty() || !found.late.is_none();
+        let base_alone = found.without_findings();
+        let worse = fit.holdout.after.rmse_n > fit.holdout.before.rmse_n;
+        let better = says_something && !worse && self.predicts_better(&base_alone, &found);
+        if says_something && !better {
+            for named in &mut mechanisms {
+                if Id::parse(named.id).is_some_and(through_force) {
+                    named.evidence.confidence = named.evidence.confidence.min(0.5);
+                }
+            }
+        }
+        mechanisms.sort_by(|a, b| b.evidence.delta_bic.total_cmp(&a.evidence.delta_bic));
         let unexplained = self.unexplained();
-        let verdict = match (
-            self.tyre.is_none() && self.dynamics.is_none(),
-            mechanisms.is_empty(),
-            unexplained.is_empty(),
-        ) {
-            (true, _, _) => Verdict::Undecided,
-            (_, true, true) => Verdict::Consistent,
-            (_, false, true) => Verdict::Explained,
-            (_, false, false) => Verdict::PartlyExplained,
-            (_, true, false) => Verdict::Unexplained,
+        let verdict = match (mechanisms.is_empty(), unexplained.is_empty()) {
+            (true, true) => Verdict::Consistent,
+            (false, true) => Verdict::Explained,
+            (false, false) => Verdict::PartlyExplained,
+            (true, false) => Verdict::Unexplained,
         };
         let (r#where, regions) = if mechanisms.is_empty() && unexplained.is_empty() {
             (Vec::new(), Vec::new())
         } else {
             self.located()
         };
-        let limits = self.limits;
-        let dynamic_limits = limits.for_dynamics();
-        let mut looked = Vec::new();
-        let tyre_part = self.tyre.map(|s| {
-            (
-                self.tyre_joint(s, false),
-                s.search.base.fitted.model.clone(),
-            )
-        });
-        let dynamics_part = self
-            .dynamics
-            .map(|s| (self.dynamics_joint(s, false), Model::default()));
-        if let Some((joint, base)) = &tyre_part {
-            looked.extend(looked_for(&[(joint, base)], limits));
-        }
-        if let Some((joint, base)) = &dynamics_part {
-            let found = looked_for(&[(joint, base)], &dynamic_limits);
-            if looked.is_empty() {
-                looked = found;
-            } else {
-                for (known, own) in looked.iter_mut().zip(found) {
-                    if !known.identifiable && known.minimum_detectable.is_none() {
-                        *known = own;
-                    }
-                }
-            }
-        }
-        if looked.is_empty() {
-            looked = looked_for(&[], limits);
-        }
         Diagnosis {
             schema: "muslip.diagnosis/1",
             verdict,
-            recordings: self.recordings(),
+            recordings: self.given.recordings(kept),
             noise: self.noise(),
-            base: self.base(&tyre_covariance),
+            base: self.base(),
             r#where,
             regions,
             mechanisms,
             unexplained,
-            looked_for: looked,
-            data_faults: self.faults(),
-            // The audit of the chain is yet to fill it.
-            chain: self.chain_findings.clone(),
-            fit: self.scores(),
-            caveats: self.caveats(),
-            traces: self.traces(),
-            repaired: self.repaired(&tyre_covariance, &dynamics_covariance),
+            looked_for: self.looked_for(),
+            data_faults: self.given.faults(kept),
+            chain: self.audit.findings.clone(),
+            fit,
+            caveats: self.caveats(kept),
+            traces: traces(kept, &predicted, self.data.context.radius),
+            repaired: if better { found.clone() } else { base_alone },
+            found,
         }
     }
 
-    fn recordings(&self) -> Vec<Recording> {
-        self.data
-            .series
+    /// Covariance in the order of the model's whole vector.
+    fn covariance(&self, judged: &Judged) -> DMatrix<f64> {
+        let n = judged.model.vector().len();
+        let own: Vec<usize> = [0, 1].into_iter().chain(TYRE_BASE..n).collect();
+        let mut all = DMatrix::zeros(n, n);
+        for (i, &a) in own.iter().enumerate() {
+            for (j, &b) in own.iter().enumerate() {
+                all[(a, b)] = finite_or_zero(judged.covariance[(i, j)]);
+            }
+        }
+        all
+    }
+
+    /// Coefficients of each free dependence.
+    fn dependences(&self) -> Vec<(&Dependence, Vec<f64>)> {
+        let chosen = &self.decision.chosen;
+        let mut at = 2 + chosen.model.vector().len() - TYRE_BASE;
+        chosen
+            .extra
             .iter()
-            .map(|s| Recording {
-                path: s.name.clone(),
-                samples: s.len() * self.data.averaged,
-                role: if !self.split.by_block && self.split.proof_runs.contains(&s.index) {
-                    Role::Holdout
-                } else {
-                    Role::Fit
-                },
+            .map(|own| {
+                let from = at;
+                at += own.knots.len();
+                (
+                    own,
+                    (from..at).map(|i| finite_or_zero(chosen.left[i])).collect(),
+                )
             })
             .collect()
+    }
+
+    /// White noise of a balance's readings as fitted.
+    fn white(&self, balance: Balance) -> Option<f64> {
+        let parts = self
+            .decision
+            .chosen
+            .parts
+            .iter()
+            .find(|p| p.balance == balance)?;
+        parts
+            .sources
+            .iter()
+            .find(|s| s.kind.is_none())
+            .map(|s| s.log_std.exp())
     }
 }

@@ -1,76 +1,84 @@
-//! The repaired model as plain data.
+//! The repaired model as plain data, and whether it is the one that predicts.
 
-use nalgebra::DMatrix;
+use super::Answer;
+use crate::campaign::Run;
+use crate::chain::correct::Lateness;
+use crate::law::closest;
+use crate::mechanism::{Balance, Stage};
+use crate::model::Model;
+use crate::number::finite_or_zero;
+use crate::prepare::Series;
+use crate::repaired::{
+    Correction, Domain, KnownRecording, NoiseModel, Repaired, RepairedTerm, Which,
+};
 
-use super::Outcome;
-use crate::omnibus::finite_or_zero;
-use crate::proof::Likelihood;
-use crate::repaired::{Domain, KnownRecording, NoiseModel, Repaired};
-use crate::tyre_stage;
+/// Least mean logarithm by which a repaired model lowers the square of a prediction's error: less is chance.
+const LEAST_GAIN_OF_PREDICTION: f64 = 0.01;
 
-impl Outcome<'_> {
-    pub(super) fn repaired(
-        &self,
-        tyre_covariance: &DMatrix<f64>,
-        dynamics_covariance: &DMatrix<f64>,
-    ) -> Repaired {
-        let data = self.data;
-        let rows = |m: &DMatrix<f64>| -> Vec<Vec<f64>> {
-            (0..m.nrows())
-                .map(|i| (0..m.ncols()).map(|j| finite_or_zero(m[(i, j)])).collect())
-                .collect()
+impl Answer<'_> {
+    /// The model with what was named, its channels at one time where they are named late.
+    pub(super) fn repaired(&self) -> Repaired {
+        let data = &self.data;
+        let chosen = &self.decision.chosen;
+        let covariance = self.covariance(chosen);
+        let late = if self.named_delays().is_empty() {
+            Lateness::default()
+        } else {
+            self.timing.late
         };
-        let stds = |m: &DMatrix<f64>| -> Vec<f64> {
-            (0..m.nrows())
-                .map(|i| finite_or_zero(m[(i, i)].max(0.0).sqrt()))
-                .collect()
-        };
-        let start = tyre_stage::start(data).base;
-        let (base_alone, base, tyre, corrections, sigma) = match self.tyre {
-            Some(stage) => (
-                stage.search.base.fitted.model.base.clone(),
-                stage.model.base.clone(),
-                Repaired::terms(
-                    &data.catalogue,
-                    &data.context,
-                    &stage.model,
-                    &stds(tyre_covariance),
-                ),
-                stage
-                    .corrections
-                    .iter()
-                    .map(|r| r.correction.clone())
+        Repaired {
+            schema: "muslip.model/1".to_owned(),
+            averaged: self.given.averaged,
+            rig: data.rig.clone(),
+            late,
+            base_alone: self.given.plain_law(self.kept),
+            base: self.predicting_base(),
+            tyre: self.terms(true),
+            dynamics: self.terms(false),
+            corrections: self.corrections(),
+            covariance: (0..covariance.nrows())
+                .map(|i| covariance.row(i).iter().copied().collect())
+                .collect(),
+            noise: NoiseModel {
+                sigma_n: finite_or_zero(chosen.residual_n),
+                step_s: Some(finite_or_zero(self.given.data.context.dt)),
+                channels: self
+                    .noise()
+                    .into_iter()
+                    .map(|(n, c)| (n, c.sigma))
                     .collect(),
-                self.residual_sigma(stage),
-            ),
-            None => (
-                start.clone(),
-                start,
-                Vec::new(),
-                Vec::new(),
-                data.context.drag_sigma,
-            ),
-        };
-        let dynamics = self.dynamics.map_or(Vec::new(), |stage| {
-            Repaired::terms(
-                &data.catalogue,
-                &data.context,
-                &stage.search.chosen.fitted.model,
-                &stds(dynamics_covariance),
-            )
-        });
-        let mut domain = Domain::default();
-        for (name, low, high) in [
-            ("vehicle_speed_m_s", 0.0, data.context.max_speed),
-            ("drag_force_n", 0.0, data.context.max_drag),
-        ] {
-            domain.ranges.insert(name.to_owned(), [low, high]);
+                ..NoiseModel::default()
+            },
+            domain: self.domain(),
+            context: data.context.clone(),
+            recordings: self
+                .given
+                .runs
+                .iter()
+                .map(|r| KnownRecording {
+                    path: r.name.clone(),
+                    first_time_s: finite_or_zero(r.time_s.first().copied().unwrap_or(0.0)),
+                    samples: r.len() * self.given.averaged,
+                    holdout: false,
+                })
+                .collect(),
+            ..Repaired::default()
         }
-        let range = |f: &dyn Fn(&crate::prepare::Series, usize) -> f64| {
+    }
+
+    /// The range of operation of the recordings.
+    fn domain(&self) -> Domain {
+        let data = &self.data;
+        let mut domain = Domain::default();
+        let mut put = |name: &str, limits: [f64; 2]| {
+            if limits.iter().all(|x| x.is_finite()) {
+                domain.ranges.insert(name.to_owned(), limits);
+            }
+        };
+        let range = |f: &dyn Fn(&Series, usize) -> f64| {
             let mut limits = [f64::INFINITY, f64::NEG_INFINITY];
             for s in &data.series {
-                for k in (0..s.len()).filter(|k| s.rolling[*k]) {
-                    let x = f(s, k);
+                for x in (0..s.len()).filter(|k| s.rolling[*k]).map(|k| f(s, k)) {
                     if x.is_finite() {
                         limits = [limits[0].min(x), limits[1].max(x)];
                     }
@@ -78,54 +86,84 @@ impl Outcome<'_> {
             }
             limits
         };
-        for (name, limits) in [
-            ("slip", range(&|s, k| s.slip(k, data.context.radius))),
-            ("vehicle_speed_m_s", range(&|s, k| s.speed.smooth[k])),
-            ("normal_force_n", range(&|s, k| s.load.smooth[k])),
-        ] {
-            if limits[0].is_finite() && limits[1].is_finite() {
-                domain.ranges.insert(name.to_owned(), limits);
+        put("drag_force_n", [0.0, data.context.max_drag]);
+        put("slip", range(&|s, k| s.slip(k, data.context.radius)));
+        put("vehicle_speed_m_s", range(&|s, k| s.speed.smooth[k]));
+        put("normal_force_n", range(&|s, k| s.load.smooth[k]));
+        domain
+    }
+
+    /// Named terms of the tyre's balance, or of the others.
+    fn terms(&self, tyre: bool) -> Vec<RepairedTerm> {
+        let data = &self.data;
+        let chosen = &self.decision.chosen.model;
+        let mut model = Model {
+            base: chosen.base.clone(),
+            terms: Vec::new(),
+        };
+        for term in &chosen.terms {
+            let stage = data.catalogue.get(term.entry).stage();
+            let dynamic = matches!(stage, Stage::Wheel | Stage::Vehicle);
+            if dynamic != tyre {
+                model.terms.push(term.clone());
             }
         }
-        Repaired {
-            schema: "muslip.model/1".to_owned(),
-            averaged: data.averaged,
-            proof_by_blocks: self.split.by_block,
-            rig: data.rig.clone(),
-            late: crate::chain::correct::Lateness::default(),
-            base_alone,
-            base,
-            tyre,
-            dynamics,
-            corrections,
-            covariance: rows(tyre_covariance),
-            dynamics_covariance: rows(dynamics_covariance),
-            noise: NoiseModel {
-                sigma_n: finite_or_zero(sigma),
-                share_of_force: 0.0,
-                step_s: Some(finite_or_zero(data.context.dt)),
-                channels: self
-                    .noise()
-                    .into_iter()
-                    .map(|(name, noise)| (name, noise.sigma))
-                    .collect(),
-                likelihood: self.tyre.and_then(|stage| {
-                    let size = stage.noise.size?;
-                    Some(Likelihood::new(size, &stage.noise.whitener))
-                }),
-            },
-            domain,
-            context: data.context.clone(),
-            recordings: data
-                .series
-                .iter()
-                .map(|s| KnownRecording {
-                    path: s.name.clone(),
-                    first_time_s: finite_or_zero(s.time.first().copied().unwrap_or(0.0)),
-                    samples: s.len() * data.averaged,
-                    holdout: !self.split.by_block && self.split.proof_runs.contains(&s.index),
-                })
-                .collect(),
-        }
+        let stds = vec![0.0; model.vector().len()];
+        Repaired::terms(&data.catalogue, &data.context, &model, &stds)
     }
+
+    pub(super) fn corrections(&self) -> Vec<Correction> {
+        self.dependences()
+            .into_iter()
+            .filter(|(own, _)| own.balance == Balance::Tyre)
+            .map(|(own, coefficients)| own.correction(&self.data, &coefficients))
+            .collect()
+    }
+
+    /// Whether the repaired model predicts the drag of the recordings better than the law fitted to raw channels: on
+    /// the whole, and worse on few of them.
+    pub(super) fn predicts_better(&self, base: &Repaired, with: &Repaired) -> bool {
+        let chosen = &self.decision.chosen.model;
+        let per_run = chosen.terms.iter().any(|t| {
+            let entry = self.data.catalogue.get(t.entry);
+            entry.form().contains("per_run")
+        });
+        let (mut gained, mut worse) = (0.0, 0);
+        for (place, given) in self.given.runs.iter().enumerate() {
+            let mut given = given.clone();
+            if per_run {
+                // What belongs to a run is read off it anew, as on a run that the model has not seen.
+                given.name = format!("unseen {place}");
+            }
+            let (Some(a), Some(b)) = (square_error(base, &given), square_error(with, &given))
+            else {
+                return false;
+            };
+            gained += (a / b).ln();
+            if b > 1.002 * a {
+                worse += 1;
+            }
+        }
+        gained > LEAST_GAIN_OF_PREDICTION * self.given.runs.len() as f64
+            && worse * 4 <= self.given.runs.len()
+    }
+
+    /// The law's two parameters that predict best beside the named terms: by plain least squares, for a prediction has
+    /// noisy inputs, too.
+    fn predicting_base(&self) -> Vec<f64> {
+        let drags: Vec<Vec<f64>> = self.data.series.iter().map(|s| s.drag.clone()).collect();
+        closest(&self.data, &self.decision.chosen.model, &drags).base
+    }
+}
+
+/// Mean square of the error of a predicted drag.
+fn square_error(model: &Repaired, run: &Run) -> Option<f64> {
+    let predicted = model.predict(run, Which::Repaired).ok()?.drag_force_n;
+    let errors: Vec<f64> = predicted
+        .iter()
+        .zip(&run.drag_force_n)
+        .map(|(a, b)| (a - b).powi(2))
+        .filter(|e| e.is_finite())
+        .collect();
+    Some(errors.iter().sum::<f64>() / errors.len().max(1) as f64)
 }

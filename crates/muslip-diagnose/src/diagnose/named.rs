@@ -1,58 +1,56 @@
-//! What is named and what is left unexplained.
+//! What is named, how sure it is, and what is left unexplained.
 
-use nalgebra::DMatrix;
+use std::collections::BTreeMap;
 
-use super::Outcome;
-use crate::choose::Search;
-use crate::confidence::{alternatives, figures, membership};
-use crate::fit::Joint;
-use crate::mechanism::Reported;
-use crate::omnibus::finite_or_zero;
+use super::Answer;
+use crate::audit::Timing;
+use crate::decide::{Claim, PREDICTED_APART, Trial, stands};
+use crate::figures::figures;
+use crate::mechanism::{Id, Reported};
+use crate::number::finite_or_zero;
 use crate::outcome::{Alternative, Evidence, Figure, NamedMechanism, Unexplained, sentence};
 use crate::separating::separating_test;
-use crate::tyre_stage::TyreStage;
 
-impl Outcome<'_> {
-    /// Named mechanisms of one stage with their effect's size for sorting.
-    pub(super) fn named(
-        &self,
-        joint: &Joint<'_>,
-        proof: &Joint<'_>,
-        search: &Search,
-        covariance: &DMatrix<f64>,
-    ) -> Vec<(f64, NamedMechanism)> {
-        let data = self.data;
-        let fitted = &search.chosen.fitted;
-        let membership = membership(search);
-        let proof_count = proof.count().max(1) as f64;
-        let with_all = proof.loss(&fitted.model);
-        let mut out = Vec::new();
-        for (place, term) in fitted.model.terms.iter().enumerate() {
-            let mechanism = data.catalogue.get(term.entry);
-            let id = mechanism.id();
-            // What is lost without it, the others fitted anew.
-            let without = joint.without(search, place);
-            let drop = without.loss - fitted.loss;
-            let price = crate::choose::price(&fitted.model, search.count)
-                - crate::choose::price(&without.model, search.count);
-            let gain = (proof.loss(&without.model) - with_all) / proof_count;
-            let reported = figures(data, &fitted.model, covariance, place);
-            let confidence = membership.get(&id).copied().unwrap_or(0.0);
-            // A name that does not predict data that it has not seen is no explanation.
-            let confidence = if mechanism.predicts() && gain < 0.0 {
-                0.6 * confidence
-            } else {
-                confidence
-            };
-            let others = alternatives(search, id);
-            let values: Vec<Reported<f64>> = reported.iter().map(|(r, _)| r.clone()).collect();
-            let test = match others.first() {
-                Some((other, weight)) if *weight > 0.05 => separating_test(id, *other).to_owned(),
-                _ => String::new(),
-            };
-            out.push((
-                drop,
-                NamedMechanism {
+/// Softness of the choice between two names in nats: no model of this kind is exactly true.
+const SOFTNESS: f64 = 4.0;
+/// The same as a share of what the chosen name gains.
+const SOFT_SHARE: f64 = 0.03;
+/// A delay is named where it is so many standard deviations and so many seconds from none.
+const SURE_DELAY: f64 = 5.0;
+const LEAST_DELAY_S: f64 = 1.5e-3;
+/// Largest standard deviation in s of a delay that is named.
+pub(super) const VAGUE_DELAY_S: f64 = 4e-3;
+/// Delays that the timing names: no round weighs them.
+pub(super) const DELAYS: [Id; 2] = [Id::WheelSpeedDelay, Id::VehicleSpeedDelay];
+
+/// Smallest delay in s that is named where the timing is as sure as this.
+pub(super) fn least_delay(late: &Timing) -> f64 {
+    (SURE_DELAY * late.std.max(1e-4)).max(LEAST_DELAY_S)
+}
+
+impl Answer<'_> {
+    pub(super) fn named(&self) -> Vec<NamedMechanism> {
+        let chosen = &self.decision.chosen;
+        let covariance = self.covariance(chosen);
+        chosen
+            .model
+            .terms
+            .iter()
+            .enumerate()
+            .filter_map(|(place, term)| {
+                let mechanism = self.data.catalogue.get(term.entry);
+                let id = mechanism.id();
+                let (trial, round) = self.decision.rounds.iter().rev().find_map(|round| {
+                    round
+                        .iter()
+                        .find(|t| t.mechanism().is_some_and(|m| m.1 == term.entry))
+                        .map(|t| (t, round))
+                })?;
+                let reported = figures(&self.data, &chosen.model, &covariance, place);
+                let values: Vec<Reported<f64>> = reported.iter().map(|(r, _)| r.clone()).collect();
+                let (confidence, others) = confidence(trial, round, self.data.series.len());
+                let samples: usize = self.data.series.iter().map(|s| s.len()).sum();
+                Some(NamedMechanism {
                     id: id.as_str(),
                     balance: id.balance().as_str(),
                     statement: sentence(&mechanism.statement(&values, &term.parameters)),
@@ -62,55 +60,157 @@ impl Outcome<'_> {
                         .map(|(r, std)| Figure::new(r, *std))
                         .collect(),
                     evidence: Evidence {
-                        delta_bic: finite_or_zero(2.0 * (drop - price)),
-                        holdout_nll_gain_per_sample: finite_or_zero(gain),
-                        confidence: confidence.clamp(0.0, 0.999),
+                        delta_bic: 2.0 * trial.gain,
+                        holdout_nll_gain_per_sample: finite_or_zero(
+                            trial.unseen.0 * self.data.series.len() as f64 / samples.max(1) as f64,
+                        ),
+                        confidence,
                     },
-                    confusable_with: others
-                        .iter()
-                        .map(|(other, weight)| Alternative {
-                            id: other.as_str(),
-                            confidence: weight.clamp(0.0, 1.0),
-                        })
-                        .collect(),
-                    separating_test: test,
+                    separating_test: others
+                        .first()
+                        .filter(|o| o.confidence > 0.05)
+                        .and_then(|o| Id::parse(o.id))
+                        .map_or(String::new(), |other| separating_test(id, other).to_owned()),
+                    confusable_with: others,
                     effect_sigma: finite_or_zero(
-                        (2.0 * drop.max(0.0) / search.count.max(1) as f64).sqrt(),
+                        (2.0 * trial.gain.max(0.0) / samples.max(1) as f64).sqrt(),
                     ),
-                },
-            ));
-        }
-        out
-    }
-
-    pub(super) fn unexplained(&self) -> Vec<Unexplained> {
-        let mut all: Vec<Unexplained> = self.tyre.map_or_else(Vec::new, Self::unexplained_tyre);
-        if let Some(stage) = self.dynamics {
-            let explained =
-                (stage.search.base.fitted.loss - stage.search.chosen.fitted.loss).max(0.0);
-            all.extend(stage.unexplained.iter().map(|r| Unexplained {
-                balance: r.balance.as_str(),
-                variable: r.word.clone(),
-                form: r.form.clone(),
-                z: (2.0 * r.gain.max(0.0)).sqrt(),
-                share: (r.gain / (r.gain + explained).max(1e-9)).clamp(0.0, 1.0),
-            }));
-        }
-        all
-    }
-
-    pub(super) fn unexplained_tyre(stage: &TyreStage) -> Vec<Unexplained> {
-        let explained = (stage.search.base.fitted.loss - stage.search.chosen.fitted.loss).max(0.0);
-        stage
-            .unexplained
-            .iter()
-            .map(|r| Unexplained {
-                balance: "tyre",
-                variable: r.word.clone(),
-                form: r.correction.form.clone(),
-                z: (2.0 * r.gain.max(0.0)).sqrt(),
-                share: (r.gain / (r.gain + explained).max(1e-9)).clamp(0.0, 1.0),
+                })
             })
             .collect()
     }
+
+    pub(super) fn unexplained(&self) -> Vec<Unexplained> {
+        let gained: f64 = (self.decision.base.loss - self.decision.chosen.loss).max(1e-9);
+        self.decision
+            .chosen
+            .extra
+            .iter()
+            .map(|own| {
+                let gain = self
+                    .decision
+                    .rounds
+                    .iter()
+                    .flatten()
+                    .find_map(|t| match &t.claim {
+                        Claim::Dependence(d)
+                            if d.variable == own.variable && d.balance == own.balance =>
+                        {
+                            Some(t.gain)
+                        }
+                        _ => None,
+                    })
+                    .unwrap_or(0.0);
+                Unexplained {
+                    balance: own.balance.as_str(),
+                    variable: own.variable.word(&self.data),
+                    form: String::new(),
+                    z: finite_or_zero((2.0 * gain.max(0.0)).sqrt()),
+                    share: (gain / gained).clamp(0.0, 1.0),
+                }
+            })
+            .collect()
+    }
+
+    /// Delays of the speeds that the base simulation's residuals show.
+    pub(super) fn named_delays(&self) -> Vec<NamedMechanism> {
+        DELAYS
+            .iter()
+            .filter_map(|&id| {
+                let late = self.delay_of(id)?;
+                let sure = late.std < VAGUE_DELAY_S && late.value > least_delay(&late);
+                sure.then(|| self.delay(id, late.value, late.std))?
+            })
+            .collect()
+    }
+
+    /// What the timing says of a delay that is its own to name.
+    pub(super) fn delay_of(&self, id: Id) -> Option<Timing> {
+        match id {
+            Id::WheelSpeedDelay => Some(self.timing.wheel),
+            Id::VehicleSpeedDelay => Some(self.timing.vehicle),
+            _ => None,
+        }
+    }
+
+    /// A delay as a mechanism, in that mechanism's own words.
+    fn delay(&self, id: Id, value: f64, std: f64) -> Option<NamedMechanism> {
+        let mut entries = self.data.catalogue.entries().iter();
+        let mechanism = entries.find(|m| m.id() == id)?;
+        let reported = Reported {
+            name: "delay",
+            unit: "s",
+            value,
+        };
+        let z = value.abs() / std.max(1e-5);
+        Some(NamedMechanism {
+            id: id.as_str(),
+            balance: id.balance().as_str(),
+            statement: sentence(&mechanism.statement(core::slice::from_ref(&reported), &[value])),
+            equation: mechanism.equation().to_owned(),
+            parameters: vec![Figure::new(&reported, std)],
+            evidence: Evidence {
+                delta_bic: z * z,
+                // Not measured: the timing is fitted to all runs together.
+                holdout_nll_gain_per_sample: 0.0,
+                confidence: surest(self.data.series.len()).min(0.97),
+            },
+            confusable_with: Vec::new(),
+            separating_test: String::new(),
+            effect_sigma: 0.0,
+        })
+    }
+}
+
+/// Surest that so many runs can make a name.
+fn surest(runs: usize) -> f64 {
+    1.0 - 0.5f64.powf(1.0 + 0.75 * runs as f64)
+}
+
+/// How sure a name is: against the other finalists of its round, against none, and by what so many runs can show.
+fn confidence(trial: &Trial, round: &[Trial], runs: usize) -> (f64, Vec<Alternative>) {
+    let softness = SOFTNESS + SOFT_SHARE * trial.gain.max(0.0);
+    // What predicts the drag worse is less likely however much it gains, for the chain's nuisances may do its work.
+    let worse = |t: &Trial| {
+        let by = trial.predicts - t.predicts;
+        if by.is_finite() {
+            (by / PREDICTED_APART).max(0.0)
+        } else {
+            0.0
+        }
+    };
+    let weight = |t: &Trial| (((t.gain - trial.gain) / softness).min(0.0) - worse(t)).exp();
+    let mut by_id: BTreeMap<Id, f64> = BTreeMap::new();
+    let own = trial.mechanism().map(|m| m.0);
+    let mut outside = 0.0f64;
+    for other in round
+        .iter()
+        .filter(|t| stands(t) || t.mechanism().map(|m| m.0) == own)
+    {
+        match other.mechanism() {
+            Some((id, _)) => {
+                let w = by_id.entry(id).or_insert(0.0);
+                *w = w.max(weight(other));
+            }
+            None => outside = outside.max(0.5 * weight(other)),
+        }
+    }
+    let none = (-(trial.gain / softness)).exp();
+    let total = by_id.values().sum::<f64>() + none + outside;
+    let steady = 1.0 - (-0.8 * (trial.unseen.1 - 0.5)).exp();
+    let own_share = own.and_then(|id| by_id.get(&id).copied()).unwrap_or(1.0) / total;
+    let mut others: Vec<Alternative> = by_id
+        .iter()
+        .filter(|(id, _)| Some(**id) != own)
+        .map(|(id, w)| Alternative {
+            id: id.as_str(),
+            confidence: w / total,
+        })
+        .filter(|a| a.confidence > 0.01)
+        .collect();
+    others.sort_by(|a, b| b.confidence.total_cmp(&a.confidence));
+    (
+        (own_share * surest(runs) * steady).clamp(0.01, 0.99),
+        others,
+    )
 }

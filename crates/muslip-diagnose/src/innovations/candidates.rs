@@ -6,11 +6,10 @@ use super::dependence::{Dependence, width};
 use super::gram::Columns;
 use super::noise::Slopes;
 use super::rows::{Rows, quiet_force, rows, rows_of};
-use crate::data::{Data, Listed, NARROW, WIDTH};
+use crate::data::{Data, WIDTH};
 use crate::mechanism::{Balance, Evidence, Id};
 use crate::model::{Model, Term};
-use crate::number::{Dual, Number};
-use crate::omnibus::finite_or_zero;
+use crate::number::{Dual, Number, finite_or_zero};
 use crate::prepare::mean_twice_about;
 
 /// Rows of one run by balance, in the order tyre, wheel, vehicle.
@@ -32,17 +31,9 @@ pub struct Candidate {
 }
 
 /// Columns of one run that every model has: residual, base and terms; nuisances.
-type Fixed = (Vec<Triple>, Vec<(Nuisance, Triple)>);
+type Fixed = (Vec<Triple>, Vec<(f64, Triple)>);
 /// A mechanism's own columns: the parameters that they belong to, and the columns by run.
 type Own = (Vec<usize>, Vec<Vec<Triple>>);
-
-/// A nuisance of the measuring chain: columns that every model has, with a prior.
-pub struct Nuisance {
-    /// What it is.
-    pub name: &'static str,
-    /// Prior standard deviation of its coefficient, in `unit`.
-    pub std: f64,
-}
 
 /// Everything that enters, by run: `[balance][run][column]`; the residual first, then base, nuisances, candidates.
 pub struct Table {
@@ -50,8 +41,8 @@ pub struct Table {
     pub columns: [Vec<Columns>; 3],
     /// Columns of the base law.
     pub base: usize,
-    /// Nuisances, one column each.
-    pub nuisances: Vec<Nuisance>,
+    /// Prior standard deviations of the coefficients of the measuring chain's nuisances, one column each.
+    pub nuisances: Vec<f64>,
     /// Mechanisms.
     pub candidates: Vec<Candidate>,
 }
@@ -67,21 +58,10 @@ fn plain(data: &Data, model: &Model, run: usize) -> Triple {
 /// Derivatives of the rows in the parameters `which` of the model's vector.
 #[must_use]
 pub fn slopes_in(data: &Data, model: &Model, run: usize, which: &[usize]) -> Vec<Triple> {
-    if which.len() <= NARROW {
-        slopes_by::<NARROW>(data, model, run, which)
-    } else {
-        slopes_by::<WIDTH>(data, model, run, which)
-    }
-}
-
-fn slopes_by<const N: usize>(data: &Data, model: &Model, run: usize, which: &[usize]) -> Vec<Triple>
-where
-    Dual<N>: Listed,
-{
     let p = model.vector();
     let mut out = Vec::new();
-    for chunk in which.chunks(N) {
-        let dual: Vec<Dual<N>> = p
+    for chunk in which.chunks(WIDTH) {
+        let dual: Vec<Dual<WIDTH>> = p
             .iter()
             .enumerate()
             .map(|(i, v)| {
@@ -99,7 +79,7 @@ where
             &data.context,
         );
         for at in 0..chunk.len() {
-            let take = |x: &[Dual<N>]| x.iter().map(|d| d.slope[at]).collect();
+            let take = |x: &[Dual<WIDTH>]| x.iter().map(|d| d.slope[at]).collect();
             out.push([take(&all.tyre), take(&all.wheel), take(&all.vehicle)]);
         }
     }
@@ -118,8 +98,8 @@ fn second(rate: &[f64], time: &[f64]) -> Vec<f64> {
         .collect()
 }
 
-/// Columns of the measuring chain's nuisances on one run, with their names and prior sizes.
-fn nuisances(data: &Data, slopes: &Slopes, run: usize) -> Vec<(Nuisance, Triple)> {
+/// Columns of the measuring chain's nuisances on one run, with the prior standard deviations of their coefficients.
+fn nuisances(data: &Data, slopes: &Slopes, run: usize) -> Vec<(f64, Triple)> {
     let s = &data.series[run];
     let n = s.len();
     let (inertia, mass) = (data.context.inertia, data.context.mass);
@@ -225,59 +205,45 @@ fn nuisances(data: &Data, slopes: &Slopes, run: usize) -> Vec<(Nuisance, Triple)
         ]
     };
     let torque = |k: usize| s.torque.as_ref().map_or(0.0, |t| t.smooth[k]);
-    let nuisance = |name, std| Nuisance { name, std };
     vec![
+        // Wheel speed late.
+        (data.timing_std.wheel, by_wheel(&|k| wheel_rate[k])),
+        // Vehicle speed late.
+        (data.timing_std.vehicle, by_speed(&|k| speed_rate[k])),
+        // Brake late.
         (
-            nuisance("wheel speed late", data.timing_std.wheel),
-            by_wheel(&|k| wheel_rate[k]),
-        ),
-        (
-            nuisance("vehicle speed late", data.timing_std.vehicle),
-            by_speed(&|k| speed_rate[k]),
-        ),
-        (
-            nuisance("brake late", data.timing_std.brake),
+            data.timing_std.brake,
             [
                 column(Balance::Tyre, &|_| 0.0),
                 column(Balance::Wheel, &torque),
                 column(Balance::Vehicle, &|_| 0.0),
             ],
         ),
+        // Wheel speed late by turn.
         (
-            nuisance("wheel speed late by turn", 0.001),
+            0.001,
             by_wheel(&|k| wheel_rate[k] * mean / s.wheel.smooth[k].abs().max(0.1 * mean)),
         ),
-        (nuisance("force smoothed, 6 ms", 4.0), by_force(0.006)),
-        (nuisance("force smoothed, 20 ms", 3.0), by_force(0.02)),
-        (nuisance("force smoothed, 60 ms", 1.0), by_force(0.06)),
-        (
-            nuisance("brake smoothed, 6 ms", 4.0),
-            by_integral(0.006, true),
-        ),
-        (
-            nuisance("brake smoothed, 20 ms", 3.0),
-            by_integral(0.02, true),
-        ),
-        (
-            nuisance("drag smoothed, 20 ms", 3.0),
-            by_integral(0.02, false),
-        ),
-        (
-            nuisance("law's curvature under slip noise", 1.0),
-            by_curvature(),
-        ),
-        (
-            nuisance("law's curvature under moving slip", 1e-4),
-            by_motion(),
-        ),
-        (
-            nuisance("vehicle speed low-passed", 3e-3),
-            by_speed(&|k| -0.5 * speed_second[k]),
-        ),
-        (
-            nuisance("wheel speed low-passed", 3e-4),
-            by_wheel(&|k| -0.5 * wheel_second[k]),
-        ),
+        // Force smoothed, 6 ms.
+        (4.0, by_force(0.006)),
+        // Force smoothed, 20 ms.
+        (3.0, by_force(0.02)),
+        // Force smoothed, 60 ms.
+        (1.0, by_force(0.06)),
+        // Brake smoothed, 6 ms.
+        (4.0, by_integral(0.006, true)),
+        // Brake smoothed, 20 ms.
+        (3.0, by_integral(0.02, true)),
+        // Drag smoothed, 20 ms.
+        (3.0, by_integral(0.02, false)),
+        // Law's curvature under slip noise.
+        (1.0, by_curvature()),
+        // Law's curvature under moving slip.
+        (1e-4, by_motion()),
+        // Vehicle speed low-passed.
+        (3e-3, by_speed(&|k| -0.5 * speed_second[k])),
+        // Wheel speed low-passed.
+        (3e-4, by_wheel(&|k| -0.5 * wheel_second[k])),
     ]
 }
 

@@ -2,10 +2,11 @@
 //! what every mechanism has to compete with.
 
 use super::candidates::Triple;
+use crate::correction::{Action, Levers, hat, knots_among};
 use crate::data::Data;
 use crate::mechanism::Balance;
 use crate::model::Model;
-use crate::omnibus::{Action, Levers, finite_or_zero, hat, knots_among};
+use crate::number::finite_or_zero;
 use crate::repaired::Correction;
 use crate::variable::Variable;
 
@@ -38,7 +39,7 @@ pub fn width(all: &[Dependence]) -> usize {
 }
 
 /// Knots between the variable's extremes, half by quantile, half evenly: what is rare still matters.
-fn knots(data: &Data, values: &[Vec<f64>], balance: Balance) -> Vec<f64> {
+fn knots(data: &Data, values: &[Vec<f64>], balance: Balance, count: usize) -> Vec<f64> {
     let mut all: Vec<f64> = Vec::new();
     for (s, u) in data.series.iter().zip(values) {
         let used = s.segments(balance).iter();
@@ -50,8 +51,8 @@ fn knots(data: &Data, values: &[Vec<f64>], balance: Balance) -> Vec<f64> {
     if all.len() < LEAST_SAMPLES {
         return Vec::new();
     }
-    let knots = knots_among(all, KNOTS);
-    if knots.len() < LEAST_KNOTS {
+    let knots = knots_among(all, count);
+    if knots.len() < LEAST_KNOTS.min(count) {
         Vec::new()
     } else {
         knots
@@ -72,18 +73,25 @@ pub fn all(data: &Data, model: &Model) -> Vec<Dependence> {
             if !formed(balance) || holds_own_noise(&variable, balance) {
                 continue;
             }
-            let knots = knots(data, &values, balance);
-            if knots.is_empty() {
-                continue;
-            }
+            // What was recorded beside the rig's channels may well act in proportion, and differ by run alone.
+            let recorded = matches!(variable, Variable::Column(_));
+            let counts: &[usize] = if recorded { &[KNOTS, 2] } else { &[KNOTS] };
+            let shapes: Vec<Vec<f64>> = counts
+                .iter()
+                .map(|&count| knots(data, &values, balance, count))
+                .filter(|knots| !knots.is_empty())
+                .collect();
             let actions: &[Action] = if balance == Balance::Tyre {
                 &[Action::Friction, Action::Force]
             } else {
                 &[Action::Force]
             };
-            for &action in actions {
+            for (&action, knots) in actions
+                .iter()
+                .flat_map(|a| shapes.iter().map(move |k| (a, k)))
+            {
                 let columns = (0..data.series.len())
-                    .map(|run| columns(data, &levers, balance, action, &knots, &values[run], run))
+                    .map(|run| columns(data, &levers, balance, action, knots, &values[run], run))
                     .collect();
                 out.push(Dependence {
                     balance,

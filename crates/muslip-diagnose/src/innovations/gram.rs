@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use super::noise::BalanceParts;
 use super::whiten::Whitener;
 use crate::data::Data;
-use crate::omnibus::finite_or_zero;
+use crate::number::finite_or_zero;
 
 /// Columns of one run in one balance: the residual first.
 pub type Columns = Vec<Vec<f64>>;

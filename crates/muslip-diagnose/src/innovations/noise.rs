@@ -4,7 +4,7 @@ use super::rows::quiet_force;
 use super::whiten::{DIFFUSE, Kind, Part, Whitener};
 use crate::data::Data;
 use crate::mechanism::Balance;
-use crate::omnibus::finite_or_zero;
+use crate::number::finite_or_zero;
 
 /// Memory in s of the wheel speed's noise in the slip: so many of the smoother's windows, within bounds.
 const WINDOWS: f64 = 1.5;

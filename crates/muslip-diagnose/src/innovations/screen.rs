@@ -14,8 +14,8 @@ pub struct Score {
     pub gain: f64,
     /// Coefficients of its columns.
     pub coefficients: DVector<f64>,
-    /// Coefficients of base and nuisances beside it.
-    pub fixed: DVector<f64>,
+    /// Length in standard deviations of what base and nuisances leave of each column.
+    pub sizes: Vec<f64>,
 }
 
 /// Prior precision of a column of the table (residual included).
@@ -23,15 +23,15 @@ pub struct Score {
 pub fn precision(table: &Table, column: usize) -> f64 {
     let first = 1 + table.base;
     if column >= first && column < first + table.nuisances.len() {
-        table.nuisances[column - first].std.powi(-2)
+        table.nuisances[column - first].powi(-2)
     } else {
         0.0
     }
 }
 
-/// Scores every candidate; also the fit without any.
+/// Scores every candidate, best first.
 #[must_use]
-pub fn scores(table: &Table, sum: &Gram) -> Option<(DVector<f64>, f64, Vec<Score>)> {
+pub fn scores(table: &Table, sum: &Gram) -> Option<Vec<Score>> {
     let g = &sum.products;
     let fixed = table.base + table.nuisances.len();
     let n = g.nrows();
@@ -63,8 +63,6 @@ pub fn scores(table: &Table, sum: &Gram) -> Option<(DVector<f64>, f64, Vec<Score
         );
         g[(ci, cj)] - b.column(i).dot(&x.column(j))
     };
-    let rss = schur(0, 0);
-    let without = DVector::from_fn(fixed, |i, _| -x[(i, 0)] / scale[i]);
     let mut out = Vec::with_capacity(table.candidates.len());
     for (index, candidate) in table.candidates.iter().enumerate() {
         let own: Vec<usize> = candidate.columns.clone().map(|c| c + 1).collect();
@@ -91,37 +89,13 @@ pub fn scores(table: &Table, sum: &Gram) -> Option<(DVector<f64>, f64, Vec<Score
         let c = factor.solve(&r);
         let gain = 0.5 * r.dot(&c);
         let coefficients = DVector::from_fn(m, |i, _| c[i] / size[i].max(1e-150));
-        let mut fixed_with = without.clone();
-        for (i, &column) in own.iter().enumerate() {
-            for j in 0..fixed {
-                fixed_with[j] -= x[(j, column)] / scale[j] * coefficients[i];
-            }
-        }
         out.push(Score {
             candidate: index,
             gain,
             coefficients,
-            fixed: fixed_with,
+            sizes: size,
         });
     }
     out.sort_by(|a, b| b.gain.total_cmp(&a.gain));
-    Some((without, rss, out))
-}
-
-/// Half the sum of squares of one run under these coefficients.
-#[must_use]
-pub fn loss_of(
-    gram: &Gram,
-    fixed: &DVector<f64>,
-    candidate: Option<(usize, &DVector<f64>)>,
-) -> f64 {
-    let n = gram.products.nrows();
-    let mut c = DVector::zeros(n);
-    c[0] = 1.0;
-    c.rows_mut(1, fixed.len()).copy_from(fixed);
-    if let Some((first, own)) = candidate {
-        c.rows_mut(1 + fixed.len() + first, own.len())
-            .copy_from(own);
-    }
-    0.5 * c.dot(&(&gram.products * &c))
+    Some(out)
 }

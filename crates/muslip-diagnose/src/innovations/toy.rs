@@ -5,7 +5,6 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution as _, StandardNormal};
 
 use super::blocks::blocks;
-use crate::ablation::Ablation;
 use crate::campaign::{Rig, Run};
 use crate::data::Data;
 
@@ -70,7 +69,7 @@ pub(super) fn stop(noise: Noise, seed: u64) -> Data {
         }
     }
     run.brake_torque_nm = Some(torques);
-    let mut data = Data::new(&rig, core::slice::from_ref(&run), Ablation::default());
+    let mut data = Data::new(&rig, core::slice::from_ref(&run));
     data.blocks = blocks(&data);
     data
 }

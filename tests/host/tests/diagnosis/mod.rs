@@ -15,7 +15,8 @@ use muslip_diagnose::outcome::{
     Role, Score, Trace, Unexplained, Verdict,
 };
 use muslip_diagnose::repaired::{
-    Correction, Domain, KnownRecording, NoiseModel, Repaired, RepairedParameter, RepairedTerm,
+    Correction, Domain, KnownRecording, NoiseModel, Predicting, Repaired, RepairedParameter,
+    RepairedTerm,
 };
 
 /// A file of the contract as the repository has it.
@@ -102,6 +103,7 @@ pub fn repaired() -> Repaired {
         proof_by_blocks: false,
         rig: rig(),
         late: muslip_diagnose::chain::correct::Lateness::default(),
+        proof: Predicting::default(),
         base_alone: vec![0.82_f64.ln(), 0.141_f64.ln(), 0.0, 0.0, 0.0],
         base: vec![0.85_f64.ln(), 0.13_f64.ln(), 0.0, 0.0, 0.0],
         tyre: vec![
@@ -411,6 +413,7 @@ pub fn partly_explained() -> Diagnosis {
             .map(|k| trace(&format!("campaign/run0{k}.csv"), k == 4))
             .collect(),
         repaired: repaired(),
+        found: repaired(),
     }
 }
 

@@ -1,11 +1,8 @@
-//! Columns that belong to no mechanism: what a residual may depend on, by variable. They serve three
-//! ends: the noise is read off what they all leave over, a remainder is located by the variable whose
-//! columns take it up, and a mechanism has to compete with them.
+//! How a dependence that no mechanism accounts for acts on the drag: by hat functions of its variable, on the friction,
+//! the force or the slip at the peak.
 
 use crate::data::Data;
-use crate::fit::Problem;
 use crate::model::{Model, tyre};
-use crate::variable::Variable;
 
 /// How columns of a variable act.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -40,18 +37,6 @@ impl Action {
 /// Columns by run and sample.
 pub type Column = Vec<Vec<f64>>;
 
-/// A group of columns.
-pub struct Group {
-    /// What it depends on; `None` for groups that are there for the noise only.
-    pub variable: Option<Variable>,
-    /// How it acts.
-    pub action: Action,
-    /// Knots of the hat functions.
-    pub knots: Vec<f64>,
-    /// The columns.
-    pub columns: Vec<Column>,
-}
-
 /// Weights of the hat functions at `u`: the two neighbouring knots; outside, the nearest knot's.
 #[must_use]
 pub fn hat(knots: &[f64], u: f64) -> Option<(usize, f64)> {
@@ -72,60 +57,7 @@ pub fn hat(knots: &[f64], u: f64) -> Option<(usize, f64)> {
     Some((at, (u - knots[at]) / (knots[at + 1] - knots[at])))
 }
 
-/// One column for each hat function of a variable, times a lever; zero where either is not finite.
-#[must_use]
-pub fn hats(
-    knots: &[f64],
-    values: &[Vec<f64>],
-    lever: &dyn Fn(usize, usize) -> f64,
-) -> Vec<Column> {
-    (0..knots.len())
-        .map(|c| {
-            values
-                .iter()
-                .enumerate()
-                .map(|(run, u)| {
-                    u.iter()
-                        .enumerate()
-                        .map(|(k, u)| {
-                            let height = match hat(knots, *u) {
-                                Some((at, w)) if at == c => 1.0 - w,
-                                Some((at, w)) if at + 1 == c => w,
-                                _ => return 0.0,
-                            };
-                            finite_or_zero(height * lever(run, k))
-                        })
-                        .collect()
-                })
-                .collect()
-        })
-        .collect()
-}
-
-/// A number that every column and every reader of a file can take.
-#[must_use]
-pub fn finite_or_zero(x: f64) -> f64 {
-    if x.is_finite() { x } else { 0.0 }
-}
-
-/// Knots at quantiles of the variable where samples are used; fewer where values repeat.
-#[must_use]
-pub fn knots(problem: &Problem<'_>, values: &[Vec<f64>], count: usize) -> Vec<f64> {
-    let mut all: Vec<f64> = Vec::new();
-    for &run in problem.runs {
-        for segment in problem.segments(run) {
-            all.extend(
-                values[run][segment.clone()]
-                    .iter()
-                    .step_by(3)
-                    .filter(|v| v.is_finite()),
-            );
-        }
-    }
-    knots_among(all, count)
-}
-
-/// The same among these values.
+/// Knots at quantiles of these values; fewer where values repeat.
 #[must_use]
 pub fn knots_among(mut all: Vec<f64>, count: usize) -> Vec<f64> {
     if all.len() < 10 {
@@ -202,38 +134,6 @@ impl Levers {
             Action::CriticalSlip => self.critical[run][k],
         }
     }
-}
-
-/// Hat columns of a variable with an action.
-#[must_use]
-pub fn group(
-    problem: &Problem<'_>,
-    levers: &Levers,
-    variable: &Variable,
-    action: Action,
-    count: usize,
-) -> Option<Group> {
-    let data = problem.data;
-    let values: Vec<Vec<f64>> = (0..data.series.len())
-        .map(|run| {
-            if problem.runs.contains(&run) {
-                variable.values(data, run)
-            } else {
-                Vec::new()
-            }
-        })
-        .collect();
-    let knots = knots(problem, &values, count);
-    if knots.len() < 2 {
-        return None;
-    }
-    let columns = hats(&knots, &values, &|run, k| levers.of(data, action, run, k));
-    Some(Group {
-        variable: Some(variable.clone()),
-        action,
-        knots,
-        columns,
-    })
 }
 
 #[cfg(test)]

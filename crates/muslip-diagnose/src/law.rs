@@ -1,0 +1,133 @@
+//! The base law's two parameters by plain least squares: on the channels as recorded, beside named terms, or next to
+//! another model.
+
+use crate::data::Data;
+use crate::innovations::candidates::slopes_in;
+use crate::innovations::rows::rows_of;
+use crate::model::Model;
+use crate::prepare::Series;
+
+/// Steps to the best parameters.
+const STEPS: usize = 8;
+/// Halvings of a step that comes no closer.
+const HALVINGS: usize = 4;
+/// Largest step of a logarithm.
+const MOST: f64 = 0.2;
+/// A step that matters no more.
+const SMALL: f64 = 1e-5;
+
+/// The model with the law's parameters at which its readings come closest to these, one vector a run.
+pub(crate) fn closest(data: &Data, start: &Model, readings: &[Vec<f64>]) -> Model {
+    let left = |model: &Model, run: usize| -> Vec<f64> {
+        let rows = rows_of(data, model, run).tyre;
+        let drag = &data.series[run].drag;
+        let shifted = rows.iter().zip(drag).zip(&readings[run]);
+        shifted.map(|((e, own), y)| e - own + y).collect()
+    };
+    let square = |model: &Model| -> f64 {
+        let runs = 0..data.series.len();
+        runs.map(|run| {
+            let e = left(model, run);
+            let used = data.series[run].tyre.iter().flat_map(Clone::clone);
+            used.filter_map(|k| e.get(k))
+                .filter(|e| e.is_finite())
+                .map(|e| e * e)
+                .sum::<f64>()
+        })
+        .sum()
+    };
+    let mut model = start.clone();
+    let mut least = square(&model);
+    for _ in 0..STEPS {
+        let Some(step) = step(data, &model, &left) else {
+            break;
+        };
+        let mut share = 1.0;
+        let closer = (0..=HALVINGS).find_map(|_| {
+            let mut next = model.clone();
+            for (base, step) in next.base.iter_mut().zip(step) {
+                *base += (share * step).clamp(-MOST, MOST);
+            }
+            share *= 0.5;
+            let value = square(&next);
+            (value < least).then_some((next, value))
+        });
+        let Some((next, value)) = closer else {
+            break;
+        };
+        (model, least) = (next, value);
+        if step.iter().all(|s| s.abs() < SMALL) {
+            break;
+        }
+    }
+    model
+}
+
+/// The Gauss-Newton step of the law's two parameters; `None` where the samples do not tell them apart.
+fn step(data: &Data, model: &Model, left: &dyn Fn(&Model, usize) -> Vec<f64>) -> Option<[f64; 2]> {
+    let (mut a, mut b, mut c, mut u, mut v) = (0.0, 0.0, 0.0, 0.0, 0.0);
+    for (run, s) in data.series.iter().enumerate() {
+        let e = left(model, run);
+        if e.is_empty() {
+            continue;
+        }
+        let slopes = slopes_in(data, model, run, &[0, 1]);
+        for k in s.tyre.iter().flat_map(Clone::clone) {
+            let (x, y) = (slopes[0][0][k], slopes[1][0][k]);
+            if (x + y + e[k]).is_finite() {
+                a += x * x;
+                b += x * y;
+                c += y * y;
+                u -= x * e[k];
+                v -= y * e[k];
+            }
+        }
+    }
+    let determinant = a * c - b * b;
+    (determinant > 1e-9 * a * c)
+        .then(|| [(c * u - b * v) / determinant, (a * v - b * u) / determinant])
+}
+
+/// The law fitted to the channels as recorded, by the runs given: the best peak friction at each slip at the peak, and
+/// the best of these on ever finer grids.
+pub(crate) fn plain(data: &Data, series: &[Series]) -> Model {
+    let rig = &data.rig;
+    let square = |log_critical: f64| -> (f64, f64) {
+        let critical = log_critical.exp();
+        let (mut xx, mut xy, mut yy) = (0.0, 0.0, 0.0);
+        for s in series {
+            for k in s.tyre.iter().flat_map(Clone::clone) {
+                if !s.rolling[k] {
+                    continue;
+                }
+                let x = s.slip(k, rig.radius_m) / critical;
+                let shape = s.load.smooth[k] * 2.0 * x / (1.0 + x * x);
+                let y = s.drag[k];
+                if shape.is_finite() && y.is_finite() {
+                    xx += shape * shape;
+                    xy += shape * y;
+                    yy += y * y;
+                }
+            }
+        }
+        if xx > 0.0 {
+            (yy - xy * xy / xx, xy / xx)
+        } else {
+            (yy, rig.peak_friction)
+        }
+    };
+    let mut best = (f64::INFINITY, rig.critical_slip.ln(), rig.peak_friction);
+    let mut width = 1.6;
+    for _ in 0..5 {
+        let centre = best.1;
+        for i in -6..=6 {
+            let at = centre + width * f64::from(i) / 6.0;
+            let (value, peak) = square(at);
+            if value < best.0 && peak > 0.0 {
+                best = (value, at, peak);
+            }
+        }
+        width /= 4.0;
+    }
+    Model::of_law(best.2, best.1.exp())
+}
