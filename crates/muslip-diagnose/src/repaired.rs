@@ -235,20 +235,14 @@ impl Repaired {
         }
     }
 
-    /// The model without what was found of the drag, here and in the proof.
+    /// The model without what was found of the drag. Its proof stays that of what was found, and says why it went.
     #[must_use]
     pub(crate) fn without_findings(&self) -> Self {
-        let alone = |base: &Vec<f64>| Predicting {
-            base_alone: base.clone(),
-            base: base.clone(),
-            ..Predicting::default()
-        };
         Self {
             late: Lateness::default(),
             base: self.base_alone.clone(),
             tyre: Vec::new(),
             corrections: Vec::new(),
-            proof: alone(&self.proof.base_alone),
             ..self.clone()
         }
     }

@@ -13,7 +13,8 @@ use crate::prepare::Series;
 const MEAN_S: f64 = 0.05;
 
 impl Answer<'_> {
-    pub(super) fn located(&self) -> (Vec<Interval>, Vec<Region>) {
+    /// Stretches and regions of operation; `drag_sigma` is the noise of one drag reading in N.
+    pub(super) fn located(&self, drag_sigma: f64) -> (Vec<Interval>, Vec<Region>) {
         let data = &self.data;
         let mut found = Vec::new();
         let mut where_regions = Vec::new();
@@ -25,7 +26,7 @@ impl Answer<'_> {
                 Balance::Tyre => self.of_reading(),
                 Balance::Wheel | Balance::Vehicle => self.of_motion(balance),
             };
-            let sigma = self.sigma_of(balance);
+            let sigma = self.sigma_of(balance, drag_sigma);
             for (s, difference) in data.series.iter().zip(&difference) {
                 let usable = s.segments(balance);
                 for (start_s, end_s, z) in intervals(&s.time, difference, usable, sigma, sigma) {
@@ -138,7 +139,7 @@ impl Answer<'_> {
     }
 
     /// Noise of a balance's residual, in N or N m.
-    fn sigma_of(&self, balance: Balance) -> f64 {
+    fn sigma_of(&self, balance: Balance, drag: f64) -> f64 {
         let data = &self.data;
         let context = &data.context;
         let mean = |f: &dyn Fn(&Series) -> f64| {
@@ -148,7 +149,6 @@ impl Answer<'_> {
             let samples = (MEAN_S / context.dt).max(2.0);
             sigma * (12.0 / samples).sqrt() / MEAN_S
         };
-        let drag = self.white(Balance::Tyre).unwrap_or(context.drag_sigma);
         match balance {
             Balance::Tyre => drag,
             Balance::Wheel => {

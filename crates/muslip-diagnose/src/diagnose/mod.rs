@@ -237,10 +237,15 @@ impl<'a> Answer<'a> {
         for (run, recording) in found.recordings.iter_mut().enumerate() {
             recording.holdout = kept.keeps_whole(run);
         }
-        let predicted = found
-            .unseeing()
-            .predicted(self.given.runs)
-            .unwrap_or_default();
+        // Where the tyre's balance cannot be formed there is no prediction to prove.
+        let formed = self.data.series.iter().any(|s| !s.tyre.is_empty());
+        let predicted = if formed {
+            let by_proof = found.unseeing().predicted(self.given.runs);
+            by_proof.unwrap_or_default()
+        } else {
+            found.noise.sigma_n = self.data.context.drag_sigma;
+            Vec::new()
+        };
         found.set_noise(&predicted);
         let fit = fit_of(&found, &predicted);
         // A model that says nothing of the drag predicts it as the base does.
@@ -267,7 +272,7 @@ impl<'a> Answer<'a> {
         let (r#where, regions) = if mechanisms.is_empty() && unexplained.is_empty() {
             (Vec::new(), Vec::new())
         } else {
-            self.located()
+            self.located(found.noise.sigma_n)
         };
         Diagnosis {
             schema: "muslip.diagnosis/1",
