@@ -89,8 +89,6 @@ pub struct Levers {
     pub force: Column,
     /// Change of force per relative change of the slip at the peak, in N, by run.
     pub critical: Column,
-    /// Predicted reading in N, by run.
-    pub reading: Column,
 }
 
 impl Levers {
@@ -101,7 +99,6 @@ impl Levers {
         let mut levers = Self {
             force: Vec::new(),
             critical: Vec::new(),
-            reading: Vec::new(),
         };
         for series in &data.series {
             let state = tyre(&data.catalogue, model, &p, series, &data.context);
@@ -117,10 +114,7 @@ impl Levers {
                     })
                     .collect(),
             );
-            levers
-                .force
-                .push(state.contact.clone().unwrap_or_else(|| state.force.clone()));
-            levers.reading.push(state.force);
+            levers.force.push(state.contact.unwrap_or(state.force));
         }
         levers
     }

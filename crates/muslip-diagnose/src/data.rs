@@ -7,9 +7,9 @@ use rayon::prelude::*;
 use crate::campaign::{Rig, Run};
 use crate::chain::correct::TimingStd;
 use crate::innovations::blocks::Blocks;
-use crate::mechanism::{Before, Context, Mechanism, catalogue};
+use crate::mechanism::{Balance, Before, Context, Mechanism, catalogue};
 use crate::number::{Dual, Number};
-use crate::prepare::{DataFault, MOST_REACH, Series, prepare};
+use crate::prepare::{DataFault, LawProducts, MOST_REACH, Series, prepare};
 use crate::smooth::median_in_place;
 
 /// Width of the dual numbers: parameters differentiated in one pass.
@@ -109,29 +109,10 @@ const LEAST_NOISE: f64 = 1e-3;
 /// Whether the drag follows the rig file's law, at whatever peak, better than none: a run without braking has nothing
 /// to fit a law to.
 fn speaks_of_friction(series: &[Series], context: &Context) -> bool {
-    let critical = context.nominal[1];
-    let (mut xx, mut xy, mut yy, mut count) = (0.0, 0.0, 0.0, 0.0);
-    for s in series {
-        for k in s
-            .tyre
-            .iter()
-            .flat_map(Clone::clone)
-            .filter(|k| s.rolling[*k])
-        {
-            let x = s.slip(k, context.radius) / critical;
-            let shape = s.load.smooth[k] * 2.0 * x / (1.0 + x * x);
-            if (shape * s.drag[k]).is_finite() {
-                xx += shape * shape;
-                xy += shape * s.drag[k];
-                yy += s.drag[k] * s.drag[k];
-                count += 1.0;
-            }
-        }
-    }
-    let noise = context
-        .drag_sigma
-        .powi(2)
-        .max(LEAST_NOISE.powi(2) * yy / count);
+    let LawProducts { xx, xy, yy, count } =
+        LawProducts::of(series, context.radius, context.nominal[1]);
+    let least = LEAST_NOISE.powi(2) * yy / count;
+    let noise = context.drag_sigma.powi(2).max(least);
     xy > 0.0 && xy * xy / xx > 2.0 * LEAST_OF_FRICTION * noise
 }
 
@@ -207,6 +188,12 @@ impl Data {
             timing_std: TimingStd::default(),
             catalogue: Arc::default(),
         }
+    }
+
+    /// Whether a balance can be formed on any run.
+    #[must_use]
+    pub fn forms(&self, balance: Balance) -> bool {
+        self.series.iter().any(|s| !s.segments(balance).is_empty())
     }
 
     /// Share of the tyre residual's noise power that comes from noise left in the smoothed slip, 0..=1.

@@ -251,11 +251,6 @@ fn best(data: &Data, table: &Table, all: &[Score], count: usize) -> Vec<(usize, 
     out
 }
 
-/// Whether any run says anything of a balance: what belongs to one that cannot be formed is not named for another.
-fn formed(data: &Data, balance: Balance) -> bool {
-    data.series.iter().any(|s| !s.segments(balance).is_empty())
-}
-
 /// Effort of a finalist's judgement.
 fn effort(data: &Data) -> Effort {
     Effort {
@@ -295,7 +290,8 @@ fn round(data: &Data, so_far: &Judged, excluded: &[Id], chain_s: f64) -> Round {
         &found,
         &so_far.extra,
         &free,
-        &|id| !taken(id) && formed(data, id.balance()),
+        // What belongs to a balance that cannot be formed is not named for another.
+        &|id| !taken(id) && data.forms(id.balance()),
     );
     let mechanisms = table.candidates.len() - free.len();
     let mut finalists: Vec<(usize, Vec<f64>, f64)> = Vec::new();
@@ -334,6 +330,7 @@ fn round(data: &Data, so_far: &Judged, excluded: &[Id], chain_s: f64) -> Round {
             finalists.push((score.candidate, Vec::new(), size(score.candidate)));
         }
     }
+    let before = Before::new(data, so_far, chain_s);
     let mut trials: Vec<Trial> = finalists
         .par_iter()
         .filter_map(|(index, start, size)| {
@@ -355,7 +352,7 @@ fn round(data: &Data, so_far: &Judged, excluded: &[Id], chain_s: f64) -> Round {
                 }
             };
             let judged = judge(data, &model, &extra, Some(Guess::beside(so_far)), effort)?;
-            Some(tried(data, so_far, claim, judged, chain_s, *size))
+            Some(before.tried(claim, judged, *size))
         })
         .collect();
     rank(data, &mut trials);
@@ -375,17 +372,11 @@ fn better_predicted_first<T>(
     gain: impl Fn(&T) -> f64,
     predicts: impl Fn(&T) -> f64,
 ) {
-    for from in 1..best_first.len() {
-        let mut at = from;
-        while at > 0
-            && gain(&best_first[at]) > ALIKE_SHARE * gain(&best_first[at - 1])
-            && predicts(&best_first[at]).is_finite()
-            && predicts(&best_first[at]) > predicts(&best_first[at - 1]) + PREDICTED_APART
-        {
-            best_first.swap(at - 1, at);
-            at -= 1;
-        }
-    }
+    let alike = |own: &T, other: &T| gain(own) > ALIKE_SHARE * gain(other);
+    let better = |own: &T, other: &T| predicts(own) > predicts(other) + PREDICTED_APART;
+    sort_neighbours(best_first, |own, other| {
+        alike(own, other) && predicts(own).is_finite() && better(own, other)
+    });
 }
 
 /// Balances that a trial's claim is about.
@@ -403,55 +394,95 @@ fn least_claims_first<T>(
     gain: impl Fn(&T) -> f64,
     claims: impl Fn(&T) -> usize,
 ) {
-    for from in 1..best_first.len() {
+    sort_neighbours(best_first, |own, other| {
+        gain(other) - gain(own) < ALIKE_NATS && claims(own) < claims(other)
+    });
+}
+
+/// Lets each go before the one next to it, again and again, as long as it `precedes` that: for orders that hold
+/// between neighbours only.
+fn sort_neighbours<T>(all: &mut [T], precedes: impl Fn(&T, &T) -> bool) {
+    for from in 1..all.len() {
         let mut at = from;
-        while at > 0
-            && gain(&best_first[at - 1]) - gain(&best_first[at]) < ALIKE_NATS
-            && claims(&best_first[at]) < claims(&best_first[at - 1])
-        {
-            best_first.swap(at - 1, at);
+        while at > 0 && precedes(&all[at], &all[at - 1]) {
+            all.swap(at - 1, at);
             at -= 1;
         }
     }
 }
 
-fn tried(
-    data: &Data,
-    base: &Judged,
-    claim: Claim,
-    judged: Judged,
+/// The model so far, as what a trial adds to it is weighed against it.
+struct Before<'a> {
+    data: &'a Data,
+    judged: &'a Judged,
+    /// What the chain's own timing was off by, in s.
     chain_s: f64,
-    size: f64,
-) -> Trial {
-    let free = judged.free as f64 - base.free as f64;
-    let per_run = is_per_run(data, &claim);
-    let readings = judged
-        .grams
-        .iter()
-        .flatten()
-        .map(|g| g.count)
-        .sum::<usize>();
-    let predicts = match &claim {
-        Claim::Mechanism(id, _) if through_force(*id) => {
-            predicts_better_by(data, &base.model, &judged.model)
+    /// Sum of squares of the drag that its best law leaves, by run.
+    squares: Vec<f64>,
+}
+
+impl<'a> Before<'a> {
+    fn new(data: &'a Data, judged: &'a Judged, chain_s: f64) -> Self {
+        Self {
+            data,
+            judged,
+            chain_s,
+            squares: squares_by_best_law(data, &judged.model),
         }
-        _ => f64::INFINITY,
-    };
-    let outlasts_chain = match &claim {
-        Claim::Mechanism(id, entry) => memory_s(data, *id, *entry, &judged.model)
-            .is_none_or(|memory| memory > least_memory_s(data, *id, *entry).max(chain_s)),
-        Claim::Dependence(_) => true,
-    };
-    Trial {
-        claim,
-        gain: base.loss - judged.loss - PRICE_OF_PARAMETER * free - PRICE_OF_NAME,
-        unseen: unseen_gain(base, &judged, per_run),
-        outlasts_chain,
-        predicts,
-        readings: readings / judged.parts.len().max(1),
-        size,
-        judged,
     }
+
+    fn tried(&self, claim: Claim, judged: Judged, size: f64) -> Trial {
+        let (data, base) = (self.data, self.judged);
+        let free = judged.free as f64 - base.free as f64;
+        let per_run = is_per_run(data, &claim);
+        let counts = judged.grams.iter().flatten().map(|g| g.count);
+        let readings = counts.sum::<usize>() / judged.parts.len().max(1);
+        let predicts = match &claim {
+            Claim::Mechanism(id, _) if through_force(*id) => self.predicted_better(&judged.model),
+            _ => f64::INFINITY,
+        };
+        let outlasts_chain = match &claim {
+            Claim::Mechanism(id, entry) => {
+                let least = least_memory_s(data, *id, *entry).max(self.chain_s);
+                memory_s(data, *id, *entry, &judged.model).is_none_or(|memory| memory > least)
+            }
+            Claim::Dependence(_) => true,
+        };
+        Trial {
+            claim,
+            gain: base.loss - judged.loss - PRICE_OF_PARAMETER * free - PRICE_OF_NAME,
+            unseen: unseen_gain(base, &judged, per_run),
+            outlasts_chain,
+            predicts,
+            readings,
+            size,
+            judged,
+        }
+    }
+
+    /// Minus the mean over runs of the logarithm of the mean square error of the drag by this model over that by the
+    /// one before.
+    fn predicted_better(&self, with: &Model) -> f64 {
+        let after = squares_by_best_law(self.data, with);
+        let ratios: Vec<f64> = self
+            .squares
+            .iter()
+            .zip(after)
+            .map(|(before, after)| (before / after).ln())
+            .filter(|ratio| ratio.is_finite())
+            .collect();
+        ratios.iter().sum::<f64>() / ratios.len().max(1) as f64
+    }
+}
+
+/// Sum of squares of the drag that a model leaves, by run, with the law that predicts best and nothing of the chain's
+/// nuisances: those may stand for an effect.
+fn squares_by_best_law(data: &Data, model: &Model) -> Vec<f64> {
+    let drags: Vec<Vec<f64>> = data.series.iter().map(|s| s.drag.clone()).collect();
+    let best = closest(data, model, &drags);
+    let runs = data.series.iter().enumerate();
+    runs.map(|(run, s)| s.tyre_square(&rows_of(data, &best, run).tyre))
+        .collect()
 }
 
 /// Whether a mechanism works through the force that is predicted.
@@ -484,26 +515,6 @@ fn memory_s(data: &Data, id: Id, entry: usize, model: &Model) -> Option<f64> {
         Id::StructuralResonance => Some(1.0 / (core::f64::consts::TAU * first)),
         _ => None,
     }
-}
-
-/// Minus the mean over runs of the logarithm of the mean square error of the drag by one model over that by another,
-/// each with the law that predicts best and nothing of the chain's nuisances: those may stand for an effect.
-fn predicts_better_by(data: &Data, without: &Model, with: &Model) -> f64 {
-    let drags: Vec<Vec<f64>> = data.series.iter().map(|s| s.drag.clone()).collect();
-    let [without, with] = [without, with].map(|model| closest(data, model, &drags));
-    let square = |model: &Model, run: usize| -> f64 {
-        let e = rows_of(data, model, run).tyre;
-        let used = data.series[run].tyre.iter().flat_map(Clone::clone);
-        used.filter_map(|k| e.get(k))
-            .filter(|e| e.is_finite())
-            .map(|e| e * e)
-            .sum()
-    };
-    let ratios: Vec<f64> = (0..data.series.len())
-        .map(|run| (square(&without, run) / square(&with, run)).ln())
-        .filter(|ratio| ratio.is_finite())
-        .collect();
-    ratios.iter().sum::<f64>() / ratios.len().max(1) as f64
 }
 
 /// Whether a trial stands.
@@ -625,7 +636,7 @@ fn without_idle(data: &Data, mut chosen: Judged, chain_s: f64) -> Judged {
         // It was large enough when it was taken up: what counts is whether the others leave anything to it.
         let idle = judged(&model, &[], &names).filter(|without| {
             let size = f64::INFINITY;
-            !stands(&tried(data, without, claim, names.clone(), chain_s, size))
+            !stands(&Before::new(data, without, chain_s).tried(claim, names.clone(), size))
         });
         match idle {
             Some(without) => {

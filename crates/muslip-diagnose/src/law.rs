@@ -5,7 +5,7 @@ use crate::data::Data;
 use crate::innovations::candidates::slopes_in;
 use crate::innovations::rows::rows_of;
 use crate::model::Model;
-use crate::prepare::Series;
+use crate::prepare::{LawProducts, Series};
 
 /// Steps to the best parameters.
 const STEPS: usize = 8;
@@ -25,16 +25,8 @@ pub(crate) fn closest(data: &Data, start: &Model, readings: &[Vec<f64>]) -> Mode
         shifted.map(|((e, own), y)| e - own + y).collect()
     };
     let square = |model: &Model| -> f64 {
-        let runs = 0..data.series.len();
-        runs.map(|run| {
-            let e = left(model, run);
-            let used = data.series[run].tyre.iter().flat_map(Clone::clone);
-            used.filter_map(|k| e.get(k))
-                .filter(|e| e.is_finite())
-                .map(|e| e * e)
-                .sum::<f64>()
-        })
-        .sum()
+        let runs = data.series.iter().enumerate();
+        runs.map(|(run, s)| s.tyre_square(&left(model, run))).sum()
     };
     let mut model = start.clone();
     let mut least = square(&model);
@@ -93,23 +85,8 @@ fn step(data: &Data, model: &Model, left: &dyn Fn(&Model, usize) -> Vec<f64>) ->
 pub(crate) fn plain(data: &Data, series: &[Series]) -> Model {
     let rig = &data.rig;
     let square = |log_critical: f64| -> (f64, f64) {
-        let critical = log_critical.exp();
-        let (mut xx, mut xy, mut yy) = (0.0, 0.0, 0.0);
-        for s in series {
-            for k in s.tyre.iter().flat_map(Clone::clone) {
-                if !s.rolling[k] {
-                    continue;
-                }
-                let x = s.slip(k, rig.radius_m) / critical;
-                let shape = s.load.smooth[k] * 2.0 * x / (1.0 + x * x);
-                let y = s.drag[k];
-                if shape.is_finite() && y.is_finite() {
-                    xx += shape * shape;
-                    xy += shape * y;
-                    yy += y * y;
-                }
-            }
-        }
+        let LawProducts { xx, xy, yy, .. } =
+            LawProducts::of(series, rig.radius_m, log_critical.exp());
         if xx > 0.0 {
             (yy - xy * xy / xx, xy / xx)
         } else {

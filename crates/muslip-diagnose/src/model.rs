@@ -62,24 +62,6 @@ impl Model {
         }
         model
     }
-
-    /// Catalogue entries in it.
-    #[must_use]
-    pub fn entries(&self) -> Vec<usize> {
-        self.terms.iter().map(|t| t.entry).collect()
-    }
-
-    /// Ids of its mechanisms, sorted.
-    #[must_use]
-    pub fn ids(&self, catalogue: &Catalogue) -> Vec<Id> {
-        let mut ids: Vec<Id> = self
-            .terms
-            .iter()
-            .map(|t| catalogue.get(t.entry).id())
-            .collect();
-        ids.sort_unstable();
-        ids
-    }
 }
 
 /// Slices of the parameter vector that belong to the terms.

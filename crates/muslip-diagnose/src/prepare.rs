@@ -168,10 +168,48 @@ impl Series {
         let slope = 2.0 * peak / critical * (1.0 - x * x) / (1.0 + x * x).powi(2);
         self.load.smooth[k] * slope.abs() * by_wheel.hypot(by_speed)
     }
+    /// Sum of squares over the samples usable in the tyre balance; what is not finite does not count.
+    #[must_use]
+    pub fn tyre_square(&self, left: &[f64]) -> f64 {
+        let used = self.tyre.iter().flat_map(Clone::clone);
+        let left = used.filter_map(|k| left.get(k));
+        left.filter(|e| e.is_finite()).map(|e| e * e).sum()
+    }
     /// Number of samples usable in the tyre balance.
     #[must_use]
     pub fn tyre_count(&self) -> usize {
         self.tyre.iter().map(Range::len).sum()
+    }
+}
+
+/// Sums over the usable samples of drag y in N and force x in N by the law with a peak friction of one.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct LawProducts {
+    pub(crate) xx: f64,
+    pub(crate) xy: f64,
+    pub(crate) yy: f64,
+    pub(crate) count: f64,
+}
+
+impl LawProducts {
+    /// Of these runs, for a radius in m and a slip at the peak.
+    pub(crate) fn of(series: &[Series], radius: f64, critical: f64) -> Self {
+        let mut sums = Self::default();
+        for s in series {
+            let used = s.tyre.iter().flat_map(Clone::clone);
+            for k in used.filter(|k| s.rolling[*k]) {
+                let x = s.slip(k, radius) / critical;
+                let shape = s.load.smooth[k] * 2.0 * x / (1.0 + x * x);
+                let y = s.drag[k];
+                if shape.is_finite() && y.is_finite() {
+                    sums.xx += shape * shape;
+                    sums.xy += shape * y;
+                    sums.yy += y * y;
+                    sums.count += 1.0;
+                }
+            }
+        }
+        sums
     }
 }
 

@@ -471,23 +471,6 @@ fn file_name(path: &str) -> &str {
 }
 
 impl Correction {
-    /// Whether it says anything of a run that was not fitted.
-    #[must_use]
-    pub fn carries(&self) -> bool {
-        !self.knots.is_empty() || !self.harmonics.is_empty()
-    }
-
-    /// Makes it this share of itself.
-    pub fn scale(&mut self, share: f64) {
-        for value in &mut self.values {
-            *value *= share;
-        }
-        for [_, cosine, sine] in &mut self.harmonics {
-            *cosine *= share;
-            *sine *= share;
-        }
-    }
-
     /// Force added on one run in N.
     ///
     /// # Errors

@@ -1,4 +1,4 @@
-//! The result of a diagnosis by innovations, put together from what each stage found.
+//! The diagnosis: the stages of the argument in their order, and its result put together from what each found.
 
 mod figures;
 mod located;
@@ -7,11 +7,10 @@ mod named;
 
 use std::collections::BTreeMap;
 
-use self::figures::{fit_of, traces};
-use self::named::DELAYS;
-
 use nalgebra::DMatrix;
 
+use self::figures::{fit_of, traces};
+use self::named::DELAYS;
 use crate::audit::{Audit, audit};
 use crate::campaign::{Rig, Run};
 use crate::chain::timing::{Timing, timed};
@@ -19,10 +18,12 @@ use crate::data::Data;
 use crate::decide::{Decision, decide, through_force};
 use crate::innovations::dependence::Dependence;
 use crate::innovations::hypothesis::Judged;
+use crate::innovations::noise::BalanceParts;
+use crate::looked::looked_for;
 use crate::mechanism::{Balance, Id};
 use crate::model::{Model, TYRE_BASE};
 use crate::number::finite_or_zero;
-use crate::outcome::{Diagnosis, Estimate, Fault, Fit, LookedFor, Recording, Role, Verdict};
+use crate::outcome::{Diagnosis, Estimate, Fault, Fit, Recording, Role, Verdict};
 use crate::prepare::Series;
 use crate::repaired::{Predicting, Repaired};
 use crate::split::Split;
@@ -60,9 +61,10 @@ pub fn diagnose(rig: &Rig, runs: Vec<Run>, progress: Progress<'_>) -> Diagnosis 
     progress(0.6, "the same again without what is kept for the proof");
     let kept = Split::new(&given.data);
     let proof = if answer.found_nothing() {
+        let law = given.plain_law(&kept);
         Predicting {
-            base_alone: given.plain_law(&kept),
-            base: given.plain_law(&kept),
+            base_alone: law.clone(),
+            base: law,
             ..Predicting::default()
         }
     } else {
@@ -118,14 +120,7 @@ impl Given<'_> {
             regions: Vec::new(),
             mechanisms: Vec::new(),
             unexplained: Vec::new(),
-            looked_for: Id::ALL
-                .iter()
-                .map(|id| LookedFor {
-                    id: id.as_str(),
-                    identifiable: false,
-                    minimum_detectable: None,
-                })
-                .collect(),
+            looked_for: Id::ALL.iter().map(|id| looked_for(*id, &[])).collect(),
             data_faults: self.faults(&Split::default()),
             chain: audit.findings,
             fit: Fit::default(),
@@ -238,12 +233,10 @@ impl<'a> Answer<'a> {
             recording.holdout = kept.keeps_whole(run);
         }
         // Where the tyre's balance cannot be formed there is no prediction to prove.
-        let formed = self.data.series.iter().any(|s| !s.tyre.is_empty());
-        let predicted = if formed {
+        let predicted = if self.data.forms(Balance::Tyre) {
             let by_proof = found.unseeing().predicted(self.given.runs);
             by_proof.unwrap_or_default()
         } else {
-            found.noise.sigma_n = self.data.context.drag_sigma;
             Vec::new()
         };
         found.set_noise(&predicted);
@@ -328,16 +321,9 @@ impl<'a> Answer<'a> {
 
     /// White noise of a balance's readings as fitted.
     fn white(&self, balance: Balance) -> Option<f64> {
-        let parts = self
-            .decision
-            .chosen
-            .parts
-            .iter()
-            .find(|p| p.balance == balance)?;
+        let mut parts = self.decision.chosen.parts.iter();
         parts
-            .sources
-            .iter()
-            .find(|s| s.kind.is_none())
-            .map(|s| s.log_std.exp())
+            .find(|p| p.balance == balance)
+            .map(BalanceParts::white)
     }
 }

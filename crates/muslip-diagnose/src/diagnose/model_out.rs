@@ -5,7 +5,7 @@ use crate::campaign::Run;
 use crate::chain::correct::Lateness;
 use crate::law::closest;
 use crate::mechanism::{Balance, Stage};
-use crate::model::Model;
+use crate::model::{Model, TYRE_BASE};
 use crate::number::finite_or_zero;
 use crate::prepare::Series;
 use crate::repaired::{
@@ -15,12 +15,17 @@ use crate::repaired::{
 /// Least mean logarithm by which a repaired model lowers the square of a prediction's error: less is chance.
 const LEAST_GAIN_OF_PREDICTION: f64 = 0.01;
 
+/// Terms of a model with the covariance of all its parameters.
+struct Terms {
+    terms: Vec<RepairedTerm>,
+    covariance: Vec<Vec<f64>>,
+}
+
 impl Answer<'_> {
     /// The model with what was named, its channels at one time where they are named late.
     pub(super) fn repaired(&self) -> Repaired {
         let data = &self.data;
-        let chosen = &self.decision.chosen;
-        let covariance = self.covariance(chosen);
+        let [tyre, dynamics] = [true, false].map(|tyre| self.terms(tyre));
         let late = if self.named_delays().is_empty() {
             Lateness::default()
         } else {
@@ -33,14 +38,13 @@ impl Answer<'_> {
             late,
             base_alone: self.given.plain_law(self.kept),
             base: self.predicting_base(),
-            tyre: self.terms(true),
-            dynamics: self.terms(false),
+            tyre: tyre.terms,
+            dynamics: dynamics.terms,
             corrections: self.corrections(),
-            covariance: (0..covariance.nrows())
-                .map(|i| covariance.row(i).iter().copied().collect())
-                .collect(),
+            covariance: tyre.covariance,
+            dynamics_covariance: dynamics.covariance,
             noise: NoiseModel {
-                sigma_n: finite_or_zero(chosen.residual_n),
+                sigma_n: finite_or_zero(data.context.drag_sigma),
                 step_s: Some(finite_or_zero(self.given.data.context.dt)),
                 channels: self
                     .noise()
@@ -93,23 +97,40 @@ impl Answer<'_> {
         domain
     }
 
-    /// Named terms of the tyre's balance, or of the others.
-    fn terms(&self, tyre: bool) -> Vec<RepairedTerm> {
+    /// Named terms of the tyre's balance, beside the base law, or of the others.
+    fn terms(&self, tyre: bool) -> Terms {
         let data = &self.data;
-        let chosen = &self.decision.chosen.model;
+        let chosen = &self.decision.chosen;
+        let all = self.covariance(chosen);
         let mut model = Model {
-            base: chosen.base.clone(),
+            base: Vec::new(),
             terms: Vec::new(),
         };
-        for term in &chosen.terms {
+        let mut places: Vec<usize> = Vec::new();
+        if tyre {
+            model.base.clone_from(&chosen.model.base);
+            places.extend(0..TYRE_BASE);
+        }
+        let mut at = TYRE_BASE;
+        for term in &chosen.model.terms {
+            let own = at..at + term.parameters.len();
+            at = own.end;
             let stage = data.catalogue.get(term.entry).stage();
             let dynamic = matches!(stage, Stage::Wheel | Stage::Vehicle);
             if dynamic != tyre {
                 model.terms.push(term.clone());
+                places.extend(own);
             }
         }
-        let stds = vec![0.0; model.vector().len()];
-        Repaired::terms(&data.catalogue, &data.context, &model, &stds)
+        let stds: Vec<f64> = places
+            .iter()
+            .map(|&i| all[(i, i)].max(0.0).sqrt())
+            .collect();
+        let row = |&i: &usize| places.iter().map(|&j| all[(i, j)]).collect();
+        Terms {
+            terms: Repaired::terms(&data.catalogue, &data.context, &model, &stds),
+            covariance: places.iter().map(row).collect(),
+        }
     }
 
     pub(super) fn corrections(&self) -> Vec<Correction> {

@@ -64,13 +64,12 @@ fn knots(data: &Data, values: &[Vec<f64>], balance: Balance, count: usize) -> Ve
 pub fn all(data: &Data, model: &Model) -> Vec<Dependence> {
     let levers = Levers::new(data, model);
     let mut out = Vec::new();
-    let formed = |balance| data.series.iter().any(|s| !s.segments(balance).is_empty());
     for variable in Variable::all(data) {
         let values: Vec<Vec<f64>> = (0..data.series.len())
             .map(|run| variable.values(data, run))
             .collect();
         for balance in [Balance::Tyre, Balance::Wheel, Balance::Vehicle] {
-            if !formed(balance) || holds_own_noise(&variable, balance) {
+            if !data.forms(balance) || holds_own_noise(&variable, balance) {
                 continue;
             }
             // What was recorded beside the rig's channels may well act in proportion, and differ by run alone.

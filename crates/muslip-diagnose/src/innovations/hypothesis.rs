@@ -10,7 +10,6 @@ use super::gram::{Columns, Gram, Solved, grams, solve, total};
 use super::noise::{BalanceParts, Slopes, parts};
 use super::screen::precision;
 use crate::data::Data;
-use crate::mechanism::Balance;
 use crate::model::{Model, TYRE_BASE};
 
 /// A model at its best, and what it says of every run.
@@ -28,8 +27,6 @@ pub struct Judged {
     pub free: usize,
     /// Inner products of base, terms and nuisances by half run: `[run][half]`.
     pub grams: Vec<[Gram; 2]>,
-    /// Root mean square of the drag's residual in N.
-    pub residual_n: f64,
     /// Negative log likelihood of each run under parameters from all others.
     pub unseen: Vec<f64>,
     /// The same of each half run under parameters from all other halves.
@@ -300,7 +297,6 @@ impl Place {
             nuisances: self.table.nuisances.len(),
             prior: (0..n).map(prior).collect(),
             left: coefficients.clone(),
-            residual_n: drag_residual(&self.table, &coefficients),
             unseen: runs.collect::<Option<_>>()?,
             unseen_halves: halves.collect::<Option<_>>()?,
             model: self.model,
@@ -450,22 +446,6 @@ pub fn judge(
     .refitted(data, extra, effort, added)?
     .descended(data, extra, effort.steps.div_ceil(2))?
     .judged(data, extra)
-}
-
-/// Root mean square of what the coefficients of all columns, those of the chain included, leave of the drag, in N.
-fn drag_residual(table: &Table, coefficients: &DVector<f64>) -> f64 {
-    let (mut square, mut count) = (0.0, 0.0);
-    for columns in &table.columns[Balance::Tyre as usize] {
-        let Some(residual) = columns.first() else {
-            continue;
-        };
-        for (k, e) in residual.iter().enumerate() {
-            let fitted = columns[1..].iter().zip(coefficients.iter());
-            square += (e + fitted.map(|(x, c)| c * x[k]).sum::<f64>()).powi(2);
-            count += 1.0;
-        }
-    }
-    (square / f64::max(count, 1.0)).sqrt()
 }
 
 /// Negative log likelihood of a part of the readings, given all others: parameters that the others do not know are as

@@ -175,8 +175,7 @@ pub fn parts(data: &Data, slopes: &Slopes) -> Vec<BalanceParts> {
         .map(|(s, law)| integral(&s.dt, &quiet_force(s, law)))
         .collect();
     let mut all = Vec::new();
-    let formed = |balance| s.iter().any(|s| !s.segments(balance).is_empty());
-    if formed(Balance::Tyre) {
+    if data.forms(Balance::Tyre) {
         all.push(BalanceParts {
             balance: Balance::Tyre,
             sources: vec![
@@ -240,7 +239,7 @@ pub fn parts(data: &Data, slopes: &Slopes) -> Vec<BalanceParts> {
             ],
         });
     }
-    if formed(Balance::Wheel) {
+    if data.forms(Balance::Wheel) {
         let turned: Vec<Vec<f64>> = s
             .iter()
             .zip(&impulse)
@@ -303,7 +302,7 @@ pub fn parts(data: &Data, slopes: &Slopes) -> Vec<BalanceParts> {
             ],
         });
     }
-    if formed(Balance::Vehicle) {
+    if data.forms(Balance::Vehicle) {
         let walk = drag * dt.sqrt();
         let level = mass * speed;
         all.push(BalanceParts {
