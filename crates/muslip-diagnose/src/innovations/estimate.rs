@@ -159,20 +159,12 @@ fn shares(
     weights: &DMatrix<f64>,
 ) -> [DVector<f64>; 2] {
     let n = filtered.whitener.samples.len();
-    let combined: Vec<Vec<f64>> = weights
-        .column_iter()
-        .map(|w| {
-            let mut sum = vec![0.0; n];
-            for (i, white) in filtered.which.iter().zip(&filtered.white) {
-                let w = w[*i];
-                if w != 0.0 {
-                    for (s, x) in sum.iter_mut().zip(white) {
-                        *s += w * x;
-                    }
-                }
-            }
-            sum
-        })
+    let which = &filtered.which;
+    let white = DMatrix::from_fn(n, which.len(), |k, i| filtered.white[i][k]);
+    let used = DMatrix::from_fn(which.len(), weights.ncols(), |i, j| weights[(which[i], j)]);
+    let combined = white * used;
+    let combined: Vec<&[f64]> = (0..weights.ncols())
+        .map(|j| &combined.as_slice()[j * n..(j + 1) * n])
         .collect();
     let own = parts.parts(run);
     let by_size = |x: &ByVariance| {

@@ -10,8 +10,11 @@
     reason = "rows and columns of one matrix are told apart by their indices"
 )]
 
-/// Most states of one balance.
-pub const MOST: usize = 12;
+use pulp::{Arch, Simd, WithSimd};
+
+/// Most states of one balance. All loops run over so many, so that they are unrolled: what a balance has less are
+/// parts of no variance that enter nothing.
+pub const MOST: usize = 8;
 /// Columns that go through the filter side by side.
 const LANES: usize = 8;
 /// Variance of a level of which nothing is known, over that of the other parts.
@@ -44,9 +47,8 @@ pub struct Part<'a> {
 
 /// The filter's gains on one run: what whitens any column.
 pub struct Whitener {
-    parts: usize,
-    walk: bool,
-    integrated: [bool; MOST],
+    /// One where a part is integrated into the walk, else nothing.
+    integrated: [f64; MOST],
     /// Samples in use, in order.
     pub samples: Vec<usize>,
     steps: Vec<Step>,
@@ -88,9 +90,18 @@ fn same(a: f64, b: f64) -> bool {
     (a - b).abs() <= 1e-9 * b
 }
 
+/// What each part keeps of itself over a step of time.
+fn decays(parts: &[Part<'_>], dt: f64) -> [f64; MOST] {
+    core::array::from_fn(|i| match parts.get(i).map(|part| part.kind) {
+        Some(Kind::Forgetting(tau) | Kind::Integrated(tau)) => (-dt / tau).exp(),
+        _ => 1.0,
+    })
+}
+
 impl Whitener {
     /// Runs the filter's covariance over every `stride`-th reading of a run. `segments` are the stretches in use, `white` the
-    /// standard deviation of each reading's own noise, `diffuse` the variance of a level of which nothing is known.
+    /// standard deviation of each reading's own noise, `diffuse` the variance of a level of which nothing is known; at
+    /// most [`MOST`] parts.
     #[must_use]
     pub fn new(
         time: &[f64],
@@ -100,26 +111,14 @@ impl Whitener {
         diffuse: f64,
         parts: &[Part<'_>],
     ) -> Self {
-        let m = parts.len().min(MOST);
-        let parts = &parts[..m];
-        let walk = m > 0 && parts[0].kind == Kind::Walk;
-        let mut integrated = [false; MOST];
-        let mut p = [[0.0; MOST]; MOST];
-        let mut process = [0.0; MOST];
-        for (i, part) in parts.iter().enumerate() {
-            let variance = part.std * part.std;
-            process[i] = variance;
-            integrated[i] = matches!(part.kind, Kind::Integrated(_));
-            p[i][i] = if part.kind == Kind::Walk {
-                0.0
-            } else {
-                variance
-            };
-        }
+        debug_assert!(parts.len() <= MOST, "{} parts", parts.len());
+        let walk = parts.first().is_some_and(|part| part.kind == Kind::Walk);
+        let is_integrated = |part: &Part<'_>| matches!(part.kind, Kind::Integrated(_));
         let mut out = Self {
-            parts: m,
-            walk,
-            integrated,
+            integrated: core::array::from_fn(|i| match parts.get(i) {
+                Some(part) if walk && is_integrated(part) => 1.0,
+                _ => 0.0,
+            }),
             samples: Vec::new(),
             steps: Vec::new(),
             decays: Vec::new(),
@@ -128,7 +127,7 @@ impl Whitener {
         let mut before = f64::NAN;
         let mut spans: Vec<f64> = Vec::new();
         for segment in segments {
-            let mut first = true;
+            let mut fresh = walk;
             for k in segment.clone().step_by(stride.max(1)) {
                 let dt = if before.is_nan() {
                     0.0
@@ -138,51 +137,35 @@ impl Whitener {
                 before = time[k];
                 let decay = recent(&spans, dt).unwrap_or_else(|| {
                     spans.push(dt);
-                    out.decays.push(core::array::from_fn(|i| {
-                        match parts.get(i).map(|part| part.kind) {
-                            Some(Kind::Forgetting(tau) | Kind::Integrated(tau)) => {
-                                (-dt / tau).exp()
-                            }
-                            _ => 1.0,
-                        }
-                    }));
+                    out.decays.push(decays(parts, dt));
                     spans.len() - 1
                 });
-                let noise = white * white;
-                predict(
-                    &mut p,
-                    m,
-                    dt,
-                    &out.decays[decay],
-                    walk,
-                    &integrated,
-                    &process,
-                    parts,
-                );
-                let fresh = walk && first;
-                if fresh {
-                    forget_level(&mut p, m, diffuse);
-                }
-                first = false;
-                let row: [f64; MOST] = core::array::from_fn(|i| {
-                    parts.get(i).map_or(0.0, |part| match part.kind {
-                        Kind::Integrated(_) => 0.0,
-                        _ => part.gain.get(k).copied().unwrap_or(1.0),
-                    })
-                });
-                let (gain, variance) = update(&mut p, m, &row, noise);
-                out.log_variances.push(variance.ln());
                 out.samples.push(k);
                 out.steps.push(Step {
-                    gain,
-                    row,
-                    inverse: 1.0 / variance.sqrt(),
+                    gain: [0.0; MOST],
+                    row: core::array::from_fn(|i| {
+                        parts.get(i).map_or(0.0, |part| match part.kind {
+                            Kind::Integrated(_) => 0.0,
+                            _ => part.gain.get(k).copied().unwrap_or(1.0),
+                        })
+                    }),
+                    inverse: 0.0,
                     dt,
                     decay: decay as u32,
                     fresh,
                 });
+                fresh = false;
             }
         }
+        let mut variances = vec![0.0; out.steps.len()];
+        Arch::new().dispatch(Covariance {
+            whitener: &mut out,
+            parts,
+            noise: white * white,
+            diffuse,
+            variances: &mut variances,
+        });
+        out.log_variances = variances.iter().map(|v| v.ln()).collect();
         out
     }
 
@@ -190,91 +173,200 @@ impl Whitener {
     /// variance adds to V: minus the slope of Σ yᵀ V⁻¹ y. By one pass back through the filter (Koopman and Shephard
     /// 1992, Biometrika 79: exact score of a model in state space). `parts` are those that the filter was made with.
     #[must_use]
-    pub fn squares(&self, innovations: &[Vec<f64>], parts: &[Part<'_>]) -> ByVariance {
+    pub fn squares(&self, innovations: &[&[f64]], parts: &[Part<'_>]) -> ByVariance {
+        let kinds = kinds(parts);
         let mut out = ByVariance::default();
         for group in innovations.chunks(LANES) {
-            self.add_squares(group, parts, &mut out);
+            Arch::new().dispatch(Squares {
+                whitener: self,
+                innovations: group,
+                kinds: &kinds,
+                out: &mut out,
+            });
         }
         out
     }
 
-    /// What a unit of a part's variance adds before each reading.
-    fn driven(&self, at: usize, part: usize, kind: Kind) -> f64 {
+    /// What a unit of each part's variance adds before a reading.
+    #[inline(always)]
+    fn driven(&self, at: usize, kinds: &[Kind; MOST]) -> [f64; MOST] {
         let start = if at == 0 { 1.0 } else { 0.0 };
         let step = &self.steps[at];
-        match kind {
+        let decay = &self.decays[step.decay as usize];
+        core::array::from_fn(|i| match kinds[i] {
             Kind::Walk => step.dt,
             Kind::Constant => start,
-            Kind::Forgetting(_) | Kind::Integrated(_) => {
-                start + 1.0 - self.decays[step.decay as usize][part].powi(2)
-            }
-        }
+            Kind::Forgetting(_) | Kind::Integrated(_) => start + 1.0 - decay[i] * decay[i],
+        })
     }
 
     /// Tr V⁻¹ K, K being what a unit of a variance adds to V: the slope of log|V|, by the same pass.
     #[must_use]
     pub fn traces(&self, parts: &[Part<'_>]) -> ByVariance {
-        let m = self.parts;
+        let kinds = kinds(parts);
+        Arch::new().dispatch(Traces {
+            whitener: self,
+            kinds: &kinds,
+        })
+    }
+
+    /// Innovations of several columns, each over its own standard deviation.
+    #[must_use]
+    pub fn apply(&self, columns: &[&[f64]]) -> Vec<Vec<f64>> {
+        let mut out = vec![vec![0.0; self.samples.len()]; columns.len()];
+        for (group, into) in columns.chunks(LANES).zip(out.chunks_mut(LANES)) {
+            Arch::new().dispatch(Apply {
+                whitener: self,
+                columns: group,
+                out: into,
+            });
+        }
+        out
+    }
+}
+
+// Each pass is compiled for the wider registers of newer processors, too, and the widest that is there runs. None
+// fuses a product with a sum, so all give the same digits.
+
+/// All gains and the innovations' variances.
+struct Covariance<'a> {
+    whitener: &'a mut Whitener,
+    parts: &'a [Part<'a>],
+    noise: f64,
+    diffuse: f64,
+    variances: &'a mut [f64],
+}
+
+impl WithSimd for Covariance<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _simd: S) -> Self::Output {
+        let mut p = [[0.0; MOST]; MOST];
+        // What drives each part: once over its memory, or over a second.
+        let (mut forgotten, mut walked) = ([0.0; MOST], 0.0);
+        for (i, part) in self.parts.iter().enumerate().take(MOST) {
+            let variance = part.std * part.std;
+            match part.kind {
+                Kind::Walk => walked = variance,
+                Kind::Constant => p[i][i] = variance,
+                Kind::Forgetting(_) | Kind::Integrated(_) => {
+                    p[i][i] = variance;
+                    forgotten[i] = variance;
+                }
+            }
+        }
+        for (step, own) in self.whitener.steps.iter_mut().zip(self.variances) {
+            let decay = &self.whitener.decays[step.decay as usize];
+            let along = self
+                .whitener
+                .integrated
+                .map(|integrated| integrated * step.dt);
+            predict(&mut p, decay, &along);
+            p[0][0] += walked * step.dt;
+            for i in 0..MOST {
+                p[i][i] += forgotten[i] * (1.0 - decay[i] * decay[i]);
+            }
+            if step.fresh {
+                forget_level(&mut p, self.diffuse);
+            }
+            let (gain, variance) = update(&mut p, &step.row, self.noise);
+            step.gain = gain;
+            step.inverse = 1.0 / variance.sqrt();
+            *own = variance;
+        }
+    }
+}
+
+/// The pass back of [`Whitener::traces`].
+struct Traces<'a> {
+    whitener: &'a Whitener,
+    kinds: &'a [Kind; MOST],
+}
+
+impl WithSimd for Traces<'_> {
+    type Output = ByVariance;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _simd: S) -> Self::Output {
         let mut out = ByVariance::default();
         let mut s = [[0.0; MOST]; MOST];
-        for (at, step) in self.steps.iter().enumerate().rev() {
+        for (at, step) in self.whitener.steps.iter().enumerate().rev() {
             let mut w = [0.0; MOST];
-            let mut d = step.inverse * step.inverse;
-            for i in 0..m {
-                for j in 0..m {
-                    w[i] += s[i][j] * step.gain[j];
+            for j in 0..MOST {
+                for i in 0..MOST {
+                    w[i] += s[j][i] * step.gain[j];
                 }
+            }
+            let mut d = step.inverse * step.inverse;
+            for i in 0..MOST {
                 d += step.gain[i] * w[i];
             }
             out.white += d;
-            for i in 0..m {
-                for j in 0..m {
+            for i in 0..MOST {
+                for j in 0..MOST {
                     s[i][j] +=
                         step.row[i] * step.row[j] * d - step.row[i] * w[j] - w[i] * step.row[j];
                 }
             }
             if step.fresh {
-                for i in 0..m {
+                for i in 0..MOST {
                     s[0][i] = 0.0;
                     s[i][0] = 0.0;
                 }
             }
-            for (i, part) in parts.iter().enumerate().take(m) {
-                out.parts[i] += s[i][i] * self.driven(at, i, part.kind);
+            let driven = self.whitener.driven(at, self.kinds);
+            for i in 0..MOST {
+                out.parts[i] += s[i][i] * driven[i];
             }
-            let decay = &self.decays[step.decay as usize];
-            let along = |i: usize| if self.integrated[i] { step.dt } else { 0.0 };
-            for row in s.iter_mut().take(m) {
+            let decay = &self.whitener.decays[step.decay as usize];
+            let along = self
+                .whitener
+                .integrated
+                .map(|integrated| integrated * step.dt);
+            for row in &mut s {
                 let level = row[0];
-                for j in 0..m {
-                    row[j] = row[j] * decay[j] + along(j) * level;
+                for j in 0..MOST {
+                    row[j] = row[j] * decay[j] + along[j] * level;
                 }
             }
             let level = s[0];
-            for i in 0..m {
-                for j in 0..m {
-                    s[i][j] = s[i][j] * decay[i] + along(i) * level[j];
+            for i in 0..MOST {
+                for j in 0..MOST {
+                    s[i][j] = s[i][j] * decay[i] + along[i] * level[j];
                 }
             }
         }
         out
     }
+}
 
-    fn add_squares(&self, innovations: &[Vec<f64>], parts: &[Part<'_>], out: &mut ByVariance) {
-        let m = self.parts;
+/// The pass back of [`Whitener::squares`] for at most [`LANES`] columns.
+struct Squares<'a> {
+    whitener: &'a Whitener,
+    innovations: &'a [&'a [f64]],
+    kinds: &'a [Kind; MOST],
+    out: &'a mut ByVariance,
+}
+
+impl WithSimd for Squares<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _simd: S) -> Self::Output {
         let mut s = [[0.0; LANES]; MOST];
-        for (at, step) in self.steps.iter().enumerate().rev() {
+        for (at, step) in self.whitener.steps.iter().enumerate().rev() {
             let mut u = [0.0; LANES];
-            for (u, white) in u.iter_mut().zip(innovations) {
+            for (u, white) in u.iter_mut().zip(self.innovations) {
                 *u = white[at] * step.inverse;
             }
-            for i in 0..m {
+            for i in 0..MOST {
                 for l in 0..LANES {
                     u[l] -= step.gain[i] * s[i][l];
                 }
             }
-            out.white += u.iter().map(|u| u * u).sum::<f64>();
-            for i in 0..m {
+            self.out.white += u.iter().map(|u| u * u).sum::<f64>();
+            for i in 0..MOST {
                 for l in 0..LANES {
                     s[i][l] += step.row[i] * u[l];
                 }
@@ -282,141 +374,132 @@ impl Whitener {
             if step.fresh {
                 s[0] = [0.0; LANES];
             }
-            for (i, part) in parts.iter().enumerate().take(m) {
+            let driven = self.whitener.driven(at, self.kinds);
+            for i in 0..MOST {
                 let square: f64 = s[i].iter().map(|x| x * x).sum();
-                out.parts[i] += square * self.driven(at, i, part.kind);
+                self.out.parts[i] += square * driven[i];
             }
-            let decay = &self.decays[step.decay as usize];
+            let decay = &self.whitener.decays[step.decay as usize];
             let level = s[0];
-            for i in 0..m {
-                let along = if self.integrated[i] { step.dt } else { 0.0 };
+            for i in 0..MOST {
+                let along = self.whitener.integrated[i] * step.dt;
                 for l in 0..LANES {
                     s[i][l] = s[i][l] * decay[i] + along * level[l];
                 }
             }
         }
     }
+}
 
-    /// Innovations of several columns, each over its own standard deviation.
-    #[must_use]
-    pub fn apply(&self, columns: &[&[f64]]) -> Vec<Vec<f64>> {
-        let mut out = vec![Vec::with_capacity(self.samples.len()); columns.len()];
-        for (group, into) in columns.chunks(LANES).zip(out.chunks_mut(LANES)) {
-            self.apply_group(group, into);
-        }
-        out
-    }
+/// The pass of [`Whitener::apply`] for at most [`LANES`] columns.
+struct Apply<'a> {
+    whitener: &'a Whitener,
+    columns: &'a [&'a [f64]],
+    out: &'a mut [Vec<f64>],
+}
 
-    fn apply_group(&self, columns: &[&[f64]], out: &mut [Vec<f64>]) {
-        let m = self.parts;
+impl WithSimd for Apply<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _simd: S) -> Self::Output {
         let mut x = [[0.0; LANES]; MOST];
-        for (step, &k) in self.steps.iter().zip(&self.samples) {
-            if self.walk {
-                for i in 1..m {
-                    if self.integrated[i] {
-                        for l in 0..LANES {
-                            x[0][l] += step.dt * x[i][l];
-                        }
-                    }
+        for (at, (step, &k)) in self
+            .whitener
+            .steps
+            .iter()
+            .zip(&self.whitener.samples)
+            .enumerate()
+        {
+            for i in 1..MOST {
+                let along = self.whitener.integrated[i] * step.dt;
+                for l in 0..LANES {
+                    x[0][l] += along * x[i][l];
                 }
             }
-            let decay = &self.decays[step.decay as usize];
+            let decay = &self.whitener.decays[step.decay as usize];
             let mut e = [0.0; LANES];
-            for (e, c) in e.iter_mut().zip(columns) {
+            for (e, c) in e.iter_mut().zip(self.columns) {
                 *e = c[k];
             }
-            for i in 0..m {
+            for i in 0..MOST {
                 for l in 0..LANES {
                     x[i][l] *= decay[i];
                     e[l] -= step.row[i] * x[i][l];
                 }
             }
-            for i in 0..m {
+            for i in 0..MOST {
                 for l in 0..LANES {
                     x[i][l] += step.gain[i] * e[l];
                 }
             }
-            for (o, e) in out.iter_mut().zip(e) {
-                o.push(e * step.inverse);
+            for (o, e) in self.out.iter_mut().zip(e) {
+                o[at] = e * step.inverse;
             }
         }
     }
 }
 
-#[expect(clippy::too_many_arguments, reason = "the filter's whole state")]
-fn predict(
-    p: &mut [[f64; MOST]; MOST],
-    m: usize,
-    dt: f64,
-    decay: &[f64; MOST],
-    walk: bool,
-    integrated: &[bool; MOST],
-    process: &[f64; MOST],
-    parts: &[Part<'_>],
-) {
-    if walk {
-        // Row, then column, of the level: it takes up what is integrated over the step.
-        for i in (1..m).filter(|i| integrated[*i]) {
-            for j in 0..m {
-                p[0][j] += dt * p[i][j];
-            }
-        }
-        for i in (1..m).filter(|i| integrated[*i]) {
-            for row in p.iter_mut().take(m) {
-                row[0] += dt * row[i];
-            }
+/// How the parts go in time; what there is not stays nothing.
+fn kinds(parts: &[Part<'_>]) -> [Kind; MOST] {
+    core::array::from_fn(|i| parts.get(i).map_or(Kind::Constant, |part| part.kind))
+}
+
+/// Covariance after a step of time, without what drives it: the level takes up what is integrated over the step.
+#[inline(always)]
+fn predict(p: &mut [[f64; MOST]; MOST], decay: &[f64; MOST], along: &[f64; MOST]) {
+    let mut level = p[0];
+    for i in 1..MOST {
+        for j in 0..MOST {
+            level[j] += along[i] * p[i][j];
         }
     }
-    for i in 0..m {
-        for j in 0..m {
+    p[0] = level;
+    for i in 0..MOST {
+        let mut sum = p[i][0];
+        for j in 1..MOST {
+            sum += along[j] * p[i][j];
+        }
+        p[i][0] = sum;
+    }
+    for i in 0..MOST {
+        for j in 0..MOST {
             p[i][j] *= decay[i] * decay[j];
         }
-    }
-    for (i, part) in parts.iter().enumerate() {
-        p[i][i] += match part.kind {
-            Kind::Walk => process[i] * dt,
-            Kind::Constant => 0.0,
-            Kind::Forgetting(_) | Kind::Integrated(_) => process[i] * (1.0 - decay[i] * decay[i]),
-        };
     }
 }
 
 /// After a gap nothing is known of the level.
-fn forget_level(p: &mut [[f64; MOST]; MOST], m: usize, diffuse: f64) {
-    for j in 0..m {
+fn forget_level(p: &mut [[f64; MOST]; MOST], diffuse: f64) {
+    for j in 0..MOST {
         p[0][j] = 0.0;
         p[j][0] = 0.0;
     }
     p[0][0] = diffuse;
 }
 
-fn update(
-    p: &mut [[f64; MOST]; MOST],
-    m: usize,
-    row: &[f64; MOST],
-    noise: f64,
-) -> ([f64; MOST], f64) {
+/// Takes a reading up; the gains, and the variance of the reading's innovation.
+#[inline(always)]
+fn update(p: &mut [[f64; MOST]; MOST], row: &[f64; MOST], noise: f64) -> ([f64; MOST], f64) {
     let mut ph = [0.0; MOST];
-    let mut variance = noise;
-    for i in 0..m {
-        for j in 0..m {
-            ph[i] += p[i][j] * row[j];
+    // By rows: the covariance is symmetric.
+    for j in 0..MOST {
+        for i in 0..MOST {
+            ph[i] += p[j][i] * row[j];
         }
+    }
+    let mut variance = noise;
+    for i in 0..MOST {
         variance += row[i] * ph[i];
     }
     let variance = variance.max(1e-30);
-    let mut gain = [0.0; MOST];
-    for i in 0..m {
-        gain[i] = ph[i] / variance;
-    }
-    for i in 0..m {
-        for j in 0..=i {
-            let value = p[i][j] - gain[i] * ph[j];
-            p[i][j] = value;
-            p[j][i] = value;
+    let inverse = 1.0 / variance;
+    for i in 0..MOST {
+        for j in 0..MOST {
+            p[i][j] -= ph[i] * ph[j] * inverse;
         }
     }
-    (gain, variance)
+    (ph.map(|x| x * inverse), variance)
 }
 
 #[cfg(test)]
@@ -647,7 +730,9 @@ mod tests {
         let here = [0.4, 0.6, 2.0, 1.2, 0.8, 0.5];
         let whitener = filter(&here);
         let traces = whitener.traces(&parts(&here[..5]));
-        let squares = whitener.squares(&whitener.apply(&refs), &parts(&here[..5]));
+        let white = whitener.apply(&refs);
+        let white: Vec<&[f64]> = white.iter().map(Vec::as_slice).collect();
+        let squares = whitener.squares(&white, &parts(&here[..5]));
         for i in 0..6 {
             let own = if i == 5 {
                 traces.white - squares.white
@@ -659,7 +744,7 @@ mod tests {
                 there[i] += h;
                 value(&there)
             };
-            let h = 1e-4 * here[i];
+            let h = 5e-4 * here[i];
             let difference = (by(h) - by(-h)) / (2.0 * h);
             assert!(
                 (own - difference).abs() < 1e-4 * difference.abs().max(1.0),
