@@ -1,5 +1,7 @@
 //! The repaired model as plain data, and whether it is the one that predicts.
 
+use nalgebra::DMatrix;
+
 use super::Answer;
 use crate::campaign::Run;
 use crate::chain::correct::Lateness;
@@ -25,7 +27,8 @@ impl Answer<'_> {
     /// The model with what was named, its channels at one time where they are named late.
     pub(super) fn repaired(&self) -> Repaired {
         let data = &self.data;
-        let [tyre, dynamics] = [true, false].map(|tyre| self.terms(tyre));
+        let covariance = self.covariance(&self.decision.chosen);
+        let [tyre, dynamics] = [true, false].map(|tyre| self.terms(tyre, &covariance));
         let late = if self.named_delays().is_empty() {
             Lateness::default()
         } else {
@@ -97,11 +100,11 @@ impl Answer<'_> {
         domain
     }
 
-    /// Named terms of the tyre's balance, beside the base law, or of the others.
-    fn terms(&self, tyre: bool) -> Terms {
+    /// Named terms of the tyre's balance, beside the base law, or of the others; `all` is the covariance of every
+    /// parameter.
+    fn terms(&self, tyre: bool, all: &DMatrix<f64>) -> Terms {
         let data = &self.data;
         let chosen = &self.decision.chosen;
-        let all = self.covariance(chosen);
         let mut model = Model {
             base: Vec::new(),
             terms: Vec::new(),

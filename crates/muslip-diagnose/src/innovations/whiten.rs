@@ -157,15 +157,12 @@ impl Whitener {
                 fresh = false;
             }
         }
-        let mut variances = vec![0.0; out.steps.len()];
         Arch::new().dispatch(Covariance {
             whitener: &mut out,
             parts,
             noise: white * white,
             diffuse,
-            variances: &mut variances,
         });
-        out.log_variances = variances.iter().map(|v| v.ln()).collect();
         out
     }
 
@@ -234,7 +231,6 @@ struct Covariance<'a> {
     parts: &'a [Part<'a>],
     noise: f64,
     diffuse: f64,
-    variances: &'a mut [f64],
 }
 
 impl WithSimd for Covariance<'_> {
@@ -256,12 +252,16 @@ impl WithSimd for Covariance<'_> {
                 }
             }
         }
-        for (step, own) in self.whitener.steps.iter_mut().zip(self.variances) {
-            let decay = &self.whitener.decays[step.decay as usize];
-            let along = self
-                .whitener
-                .integrated
-                .map(|integrated| integrated * step.dt);
+        let Whitener {
+            integrated,
+            steps,
+            decays,
+            log_variances,
+            ..
+        } = self.whitener;
+        for step in steps {
+            let decay = &decays[step.decay as usize];
+            let along = along(integrated, step.dt);
             predict(&mut p, decay, &along);
             p[0][0] += walked * step.dt;
             for i in 0..MOST {
@@ -273,7 +273,7 @@ impl WithSimd for Covariance<'_> {
             let (gain, variance) = update(&mut p, &step.row, self.noise);
             step.gain = gain;
             step.inverse = 1.0 / variance.sqrt();
-            *own = variance;
+            log_variances.push(variance.ln());
         }
     }
 }
@@ -320,10 +320,7 @@ impl WithSimd for Traces<'_> {
                 out.parts[i] += s[i][i] * driven[i];
             }
             let decay = &self.whitener.decays[step.decay as usize];
-            let along = self
-                .whitener
-                .integrated
-                .map(|integrated| integrated * step.dt);
+            let along = along(&self.whitener.integrated, step.dt);
             for row in &mut s {
                 let level = row[0];
                 for j in 0..MOST {
@@ -381,10 +378,10 @@ impl WithSimd for Squares<'_> {
             }
             let decay = &self.whitener.decays[step.decay as usize];
             let level = s[0];
+            let along = along(&self.whitener.integrated, step.dt);
             for i in 0..MOST {
-                let along = self.whitener.integrated[i] * step.dt;
                 for l in 0..LANES {
-                    s[i][l] = s[i][l] * decay[i] + along * level[l];
+                    s[i][l] = s[i][l] * decay[i] + along[i] * level[l];
                 }
             }
         }
@@ -411,10 +408,10 @@ impl WithSimd for Apply<'_> {
             .zip(&self.whitener.samples)
             .enumerate()
         {
+            let along = along(&self.whitener.integrated, step.dt);
             for i in 1..MOST {
-                let along = self.whitener.integrated[i] * step.dt;
                 for l in 0..LANES {
-                    x[0][l] += along * x[i][l];
+                    x[0][l] += along[i] * x[i][l];
                 }
             }
             let decay = &self.whitener.decays[step.decay as usize];
@@ -443,6 +440,12 @@ impl WithSimd for Apply<'_> {
 /// How the parts go in time; what there is not stays nothing.
 fn kinds(parts: &[Part<'_>]) -> [Kind; MOST] {
     core::array::from_fn(|i| parts.get(i).map_or(Kind::Constant, |part| part.kind))
+}
+
+/// How much of each part goes into the walk over a step of time.
+#[inline(always)]
+fn along(integrated: &[f64; MOST], dt: f64) -> [f64; MOST] {
+    integrated.map(|integrated| integrated * dt)
 }
 
 /// Covariance after a step of time, without what drives it: the level takes up what is integrated over the step.
@@ -744,6 +747,7 @@ mod tests {
                 there[i] += h;
                 value(&there)
             };
+            // The level's variance of 1e6 leaves the value ten digits: smaller steps measure its rounding.
             let h = 5e-4 * here[i];
             let difference = (by(h) - by(-h)) / (2.0 * h);
             assert!(
