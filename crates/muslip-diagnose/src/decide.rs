@@ -12,7 +12,7 @@ use crate::innovations::hypothesis::{
 use crate::innovations::noise::Slopes;
 use crate::innovations::rows::rows_of;
 use crate::innovations::screen::{Score, scores};
-use crate::law::closest;
+use crate::law::{closest, left_of};
 use crate::looked::{self, POWER, Seen};
 use crate::mechanism::{Balance, Evidence, Id};
 use crate::model::{Model, Term};
@@ -90,6 +90,14 @@ impl Trial {
         match &self.claim {
             Claim::Mechanism(id, entry) => Some((*id, *entry)),
             Claim::Dependence(_) => None,
+        }
+    }
+
+    /// The balance that its claim is of.
+    fn balance(&self, data: &Data) -> Balance {
+        match &self.claim {
+            Claim::Mechanism(_, entry) => data.catalogue.get(*entry).id().balance(),
+            Claim::Dependence(own) => own.balance,
         }
     }
 
@@ -277,7 +285,7 @@ fn detectable() -> f64 {
 fn round(data: &Data, so_far: &Judged, excluded: &[Id], chain_s: f64) -> Round {
     let effort = effort(data);
     let slopes = Slopes::new(data, &so_far.model.base);
-    let free = dependence::all(data, &so_far.model);
+    let free = dependence::all(data);
     let taken = |id: Id| {
         let entry = |t: &Term| data.catalogue.get(t.entry).id() == id;
         excluded.contains(&id) || so_far.model.terms.iter().any(entry)
@@ -427,7 +435,7 @@ impl<'a> Before<'a> {
             data,
             judged,
             chain_s,
-            squares: squares_by_best_law(data, &judged.model),
+            squares: squares_by_best_law(data, judged),
         }
     }
 
@@ -437,9 +445,14 @@ impl<'a> Before<'a> {
         let per_run = is_per_run(data, &claim);
         let counts = judged.grams.iter().flatten().map(|g| g.count);
         let readings = counts.sum::<usize>() / judged.parts.len().max(1);
-        let predicts = match &claim {
-            Claim::Mechanism(id, _) if through_force(*id) => self.predicted_better(&judged.model),
-            _ => f64::INFINITY,
+        let in_force = match &claim {
+            Claim::Mechanism(id, _) => through_force(*id),
+            Claim::Dependence(own) => own.balance == Balance::Tyre,
+        };
+        let predicts = if in_force {
+            self.predicted_better(&judged)
+        } else {
+            f64::INFINITY
         };
         let outlasts_chain = match &claim {
             Claim::Mechanism(id, entry) => {
@@ -462,7 +475,7 @@ impl<'a> Before<'a> {
 
     /// Minus the mean over runs of the logarithm of the mean square error of the drag by this model over that by the
     /// one before.
-    fn predicted_better(&self, with: &Model) -> f64 {
+    fn predicted_better(&self, with: &Judged) -> f64 {
         let after = squares_by_best_law(self.data, with);
         let ratios: Vec<f64> = self
             .squares
@@ -477,11 +490,11 @@ impl<'a> Before<'a> {
 
 /// Sum of squares of the drag that a model leaves, by run, with the law that predicts best and nothing of the chain's
 /// nuisances: those may stand for an effect.
-fn squares_by_best_law(data: &Data, model: &Model) -> Vec<f64> {
-    let drags: Vec<Vec<f64>> = data.series.iter().map(|s| s.drag.clone()).collect();
-    let best = closest(data, model, &drags);
+fn squares_by_best_law(data: &Data, judged: &Judged) -> Vec<f64> {
+    let drags = judged.drag_to_explain(data);
+    let best = closest(data, &judged.model, &drags);
     let runs = data.series.iter().enumerate();
-    runs.map(|(run, s)| s.tyre_square(&rows_of(data, &best, run).tyre))
+    runs.map(|(run, s)| s.tyre_square(&left_of(data, &best, run, &drags[run])))
         .collect()
 }
 
@@ -544,20 +557,19 @@ fn seen_on_unseen_runs(trial: &Trial) -> bool {
     mean > 0.0 && t >= least
 }
 
-/// The trial that is taken up: a mechanism, unless a free dependence accounts for much more.
-fn taken_up(trials: &[Trial]) -> Option<&Trial> {
-    let mut standing = trials.iter().filter(|t| stands(t));
-    let named = standing.clone().find(|t| t.mechanism().is_some());
-    let free = standing.find(|t| t.mechanism().is_none());
-    match (named, free) {
-        (Some(named), Some(free))
-            if free.gain > DEPENDENCE_SHARE * named.gain + DEPENDENCE_NATS =>
-        {
-            Some(free)
-        }
-        (Some(named), _) => Some(named),
-        (None, free) => free,
-    }
+/// The trial that is taken up: a mechanism, unless a free dependence accounts for much more in the same balance. One
+/// in another balance is no other account of it, and has its turn later.
+fn taken_up<'a>(data: &Data, trials: &'a [Trial]) -> Option<&'a Trial> {
+    let standing = || trials.iter().filter(|t| stands(t));
+    let Some(named) = standing().find(|t| t.mechanism().is_some()) else {
+        return standing().next();
+    };
+    let instead = |t: &&Trial| {
+        let of_same = t.balance(data) == named.balance(data);
+        of_same && t.gain > DEPENDENCE_SHARE * named.gain + DEPENDENCE_NATS
+    };
+    let mut free = standing().filter(|t| t.mechanism().is_none());
+    Some(free.find(instead).unwrap_or(named))
 }
 
 /// Decides what is named beside the base model; `chain_s` is what the chain's own timing was off by, in s.
@@ -572,7 +584,7 @@ pub fn decide(data: &Data, mut base: Judged, excluded: &[Id], chain_s: f64) -> D
             seen: found,
         } = round(data, &chosen, excluded, chain_s);
         seen.get_or_insert(found);
-        let mut next = taken_up(&trials).cloned();
+        let mut next = taken_up(data, &trials).cloned();
         if let Some(better) = next.as_ref().and_then(|t| at_noise_of(data, &chosen, t)) {
             for trial in &mut trials {
                 trial.set_against(data, &chosen, &better);
@@ -582,7 +594,7 @@ pub fn decide(data: &Data, mut base: Judged, excluded: &[Id], chain_s: f64) -> D
                 base = better.clone();
             }
             chosen = better;
-            next = taken_up(&trials).cloned();
+            next = taken_up(data, &trials).cloned();
         }
         rounds.push(trials);
         match next {

@@ -18,12 +18,7 @@ const SMALL: f64 = 1e-5;
 
 /// The model with the law's parameters at which its readings come closest to these, one vector a run.
 pub(crate) fn closest(data: &Data, start: &Model, readings: &[Vec<f64>]) -> Model {
-    let left = |model: &Model, run: usize| -> Vec<f64> {
-        let rows = rows_of(data, model, run).tyre;
-        let drag = &data.series[run].drag;
-        let shifted = rows.iter().zip(drag).zip(&readings[run]);
-        shifted.map(|((e, own), y)| e - own + y).collect()
-    };
+    let left = |model: &Model, run: usize| left_of(data, model, run, &readings[run]);
     let square = |model: &Model| -> f64 {
         let runs = data.series.iter().enumerate();
         runs.map(|(run, s)| s.tyre_square(&left(model, run))).sum()
@@ -53,6 +48,14 @@ pub(crate) fn closest(data: &Data, start: &Model, readings: &[Vec<f64>]) -> Mode
         }
     }
     model
+}
+
+/// What a model leaves of these readings of the drag on one run, in N; empty where it is not recorded.
+pub(crate) fn left_of(data: &Data, model: &Model, run: usize, readings: &[f64]) -> Vec<f64> {
+    let rows = rows_of(data, model, run).tyre;
+    let drag = &data.series[run].drag;
+    let shifted = rows.iter().zip(drag).zip(readings);
+    shifted.map(|((e, own), y)| e - own + y).collect()
 }
 
 /// The Gauss-Newton step of the law's two parameters; `None` where the samples do not tell them apart.

@@ -1,6 +1,7 @@
 //! Where the chosen model differs from the base.
 
 use super::Answer;
+use crate::correction::Levers;
 use crate::innovations::rows::rows_of;
 use crate::law::closest;
 use crate::locate::{intervals, regions};
@@ -86,13 +87,12 @@ impl Answer<'_> {
         let mut readings: Vec<Vec<f64>> = (0..data.series.len())
             .map(|run| expected(&self.decision.chosen.model, run))
             .collect();
-        for correction in self.corrections() {
-            let levers = crate::correction::Levers::new(data, &self.decision.chosen.model);
-            for (run, reading) in readings.iter_mut().enumerate() {
-                let added = correction.apply(data, &levers, run).unwrap_or_default();
-                for (y, added) in reading.iter_mut().zip(added) {
-                    *y += added;
-                }
+        for (reading, corrected) in readings
+            .iter_mut()
+            .zip(self.decision.chosen.corrected(data))
+        {
+            for (y, corrected) in reading.iter_mut().zip(corrected) {
+                *y += corrected;
             }
         }
         let base = closest(data, &self.decision.base.model, &readings);
@@ -112,7 +112,8 @@ impl Answer<'_> {
     /// The same of a wheel's or the vehicle's balance, as a moment in N m or a force in N.
     fn of_motion(&self, balance: Balance) -> Vec<Vec<f64>> {
         let data = &self.data;
-        let free = self.dependences();
+        let free = self.decision.chosen.dependences();
+        let levers = Levers::new(data, &self.decision.chosen.model);
         (0..data.series.len())
             .map(|run| {
                 let s = &data.series[run];
@@ -121,7 +122,7 @@ impl Answer<'_> {
                 let after = level(&self.decision.chosen.model);
                 let mut d: Vec<f64> = before.iter().zip(after).map(|(a, b)| b - a).collect();
                 for (own, coefficients) in &free {
-                    for (triple, c) in own.columns[run].iter().zip(coefficients) {
+                    for (triple, c) in own.columns(data, &levers, run).iter().zip(coefficients) {
                         for (d, x) in d.iter_mut().zip(&triple[balance as usize]) {
                             *d += c * x;
                         }

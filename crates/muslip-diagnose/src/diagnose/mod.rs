@@ -16,7 +16,6 @@ use crate::campaign::{Rig, Run};
 use crate::chain::timing::{Timing, timed};
 use crate::data::Data;
 use crate::decide::{Decision, decide, through_force};
-use crate::innovations::dependence::Dependence;
 use crate::innovations::hypothesis::Judged;
 use crate::innovations::noise::BalanceParts;
 use crate::looked::looked_for;
@@ -299,24 +298,6 @@ impl<'a> Answer<'a> {
             }
         }
         all
-    }
-
-    /// Coefficients of each free dependence.
-    fn dependences(&self) -> Vec<(&Dependence, Vec<f64>)> {
-        let chosen = &self.decision.chosen;
-        let mut at = 2 + chosen.model.vector().len() - TYRE_BASE;
-        chosen
-            .extra
-            .iter()
-            .map(|own| {
-                let from = at;
-                at += own.knots.len();
-                (
-                    own,
-                    (from..at).map(|i| finite_or_zero(chosen.left[i])).collect(),
-                )
-            })
-            .collect()
     }
 
     /// White noise of a balance's readings as fitted.

@@ -6,13 +6,11 @@ use super::Answer;
 use crate::campaign::Run;
 use crate::chain::correct::Lateness;
 use crate::law::closest;
-use crate::mechanism::{Balance, Stage};
+use crate::mechanism::Stage;
 use crate::model::{Model, TYRE_BASE};
 use crate::number::finite_or_zero;
 use crate::prepare::Series;
-use crate::repaired::{
-    Correction, Domain, KnownRecording, NoiseModel, Repaired, RepairedTerm, Which,
-};
+use crate::repaired::{Domain, KnownRecording, NoiseModel, Repaired, RepairedTerm, Which};
 
 /// Least mean logarithm by which a repaired model lowers the square of a prediction's error: less is chance.
 const LEAST_GAIN_OF_PREDICTION: f64 = 0.01;
@@ -43,7 +41,7 @@ impl Answer<'_> {
             base: self.predicting_base(),
             tyre: tyre.terms,
             dynamics: dynamics.terms,
-            corrections: self.corrections(),
+            corrections: self.decision.chosen.corrections(data),
             covariance: tyre.covariance,
             dynamics_covariance: dynamics.covariance,
             noise: NoiseModel {
@@ -136,14 +134,6 @@ impl Answer<'_> {
         }
     }
 
-    pub(super) fn corrections(&self) -> Vec<Correction> {
-        self.dependences()
-            .into_iter()
-            .filter(|(own, _)| own.balance == Balance::Tyre)
-            .map(|(own, coefficients)| own.correction(&self.data, &coefficients))
-            .collect()
-    }
-
     /// Whether the repaired model predicts the drag of the recordings better than the law fitted to raw channels: on
     /// the whole, and worse on few of them.
     pub(super) fn predicts_better(&self, base: &Repaired, with: &Repaired) -> bool {
@@ -172,11 +162,11 @@ impl Answer<'_> {
             && worse * 4 <= self.given.runs.len()
     }
 
-    /// The law's two parameters that predict best beside the named terms: by plain least squares, for a prediction has
-    /// noisy inputs, too.
+    /// The law's two parameters that predict best beside the named terms and the corrections: by plain least squares,
+    /// for a prediction has noisy inputs, too.
     fn predicting_base(&self) -> Vec<f64> {
-        let drags: Vec<Vec<f64>> = self.data.series.iter().map(|s| s.drag.clone()).collect();
-        closest(&self.data, &self.decision.chosen.model, &drags).base
+        let (data, chosen) = (&self.data, &self.decision.chosen);
+        closest(data, &chosen.model, &chosen.drag_to_explain(data)).base
     }
 }
 

@@ -6,6 +6,7 @@ use super::dependence::{Dependence, width};
 use super::gram::Columns;
 use super::noise::Slopes;
 use super::rows::{Rows, quiet_force, rows, rows_of};
+use crate::correction::Levers;
 use crate::data::{Data, WIDTH};
 use crate::mechanism::{Balance, Evidence, Id};
 use crate::model::{Model, Term};
@@ -39,8 +40,10 @@ type Own = (Vec<usize>, Vec<Vec<Triple>>);
 pub struct Table {
     /// Columns by balance and run.
     pub columns: [Vec<Columns>; 3],
-    /// Columns of the base law.
+    /// Columns of the base law, of terms and of free dependences.
     pub base: usize,
+    /// Those of free dependences among them, the last ones.
+    pub free: usize,
     /// Prior standard deviations of the coefficients of the measuring chain's nuisances, one column each.
     pub nuisances: Vec<f64>,
     /// Mechanisms.
@@ -263,13 +266,18 @@ pub fn table(
     let own: Vec<usize> = (model.base.len()..model.vector().len()).collect();
     let mut fixed: Vec<usize> = base.clone();
     fixed.extend(&own);
+    let levers = (extra.len() + free.len() > 0).then(|| Levers::new(data, model));
+    let columns_of = |dependence: &Dependence, run: usize| {
+        let levers = levers.as_ref();
+        levers.map_or(Vec::new(), |levers| dependence.columns(data, levers, run))
+    };
     let per_run: Vec<Fixed> = (0..runs)
         .into_par_iter()
         .map(|run| {
             let mut all = vec![plain(data, model, run)];
             all.extend(slopes_in(data, model, run, &fixed));
             for dependence in extra {
-                all.extend(dependence.columns[run].iter().cloned());
+                all.extend(columns_of(dependence, run));
             }
             (all, nuisances(data, slopes, run))
         })
@@ -329,8 +337,9 @@ pub fn table(
         at += width;
     }
     for dependence in free {
-        let width = dependence.knots.len();
-        for (run, triples) in dependence.columns.iter().enumerate() {
+        let width = dependence.width();
+        let by_run = (0..runs).map(|run| columns_of(dependence, run));
+        for (run, triples) in by_run.enumerate() {
             for triple in triples {
                 for (b, column) in triple.iter().enumerate() {
                     columns[b][run].push(data.blocks[run][b].mean(column));
@@ -349,6 +358,7 @@ pub fn table(
     Table {
         columns,
         base: fixed.len() + width(extra),
+        free: width(extra),
         nuisances: listed,
         candidates,
     }

@@ -5,7 +5,6 @@ use super::candidates::Triple;
 use crate::correction::{Action, Levers, hat, knots_among};
 use crate::data::Data;
 use crate::mechanism::Balance;
-use crate::model::Model;
 use crate::number::finite_or_zero;
 use crate::repaired::Correction;
 use crate::variable::Variable;
@@ -28,14 +27,16 @@ pub struct Dependence {
     pub action: Action,
     /// Knots of the hat functions.
     pub knots: Vec<f64>,
-    /// Columns by run.
-    pub columns: Vec<Vec<Triple>>,
+    /// The knot at which a dependence of friction is one: the law's own peak friction holds there.
+    reference: Option<usize>,
+    /// The variable by run and sample.
+    values: Vec<Vec<f64>>,
 }
 
 /// Columns of these dependences together.
 #[must_use]
 pub fn width(all: &[Dependence]) -> usize {
-    all.iter().map(|own| own.knots.len()).sum()
+    all.iter().map(Dependence::width).sum()
 }
 
 /// Knots between the variable's extremes, half by quantile, half evenly: what is rare still matters.
@@ -59,10 +60,9 @@ fn knots(data: &Data, values: &[Vec<f64>], balance: Balance, count: usize) -> Ve
     }
 }
 
-/// All dependences that a campaign can show, about a model.
+/// All dependences that a campaign can show.
 #[must_use]
-pub fn all(data: &Data, model: &Model) -> Vec<Dependence> {
-    let levers = Levers::new(data, model);
+pub fn all(data: &Data) -> Vec<Dependence> {
     let mut out = Vec::new();
     for variable in Variable::all(data) {
         let values: Vec<Vec<f64>> = (0..data.series.len())
@@ -89,15 +89,13 @@ pub fn all(data: &Data, model: &Model) -> Vec<Dependence> {
                 .iter()
                 .flat_map(|a| shapes.iter().map(move |k| (a, k)))
             {
-                let columns = (0..data.series.len())
-                    .map(|run| columns(data, &levers, balance, action, knots, &values[run], run))
-                    .collect();
                 out.push(Dependence {
                     balance,
                     variable: variable.clone(),
                     action,
                     knots: knots.clone(),
-                    columns,
+                    reference: (action == Action::Friction).then_some(knots.len() / 2),
+                    values: values.clone(),
                 });
             }
         }
@@ -115,64 +113,69 @@ fn holds_own_noise(variable: &Variable, balance: Balance) -> bool {
     }
 }
 
-/// Columns of one run: minus the lever times each hat in the tyre's row, integrated in the others.
-fn columns(
-    data: &Data,
-    levers: &Levers,
-    balance: Balance,
-    action: Action,
-    knots: &[f64],
-    u: &[f64],
-    run: usize,
-) -> Vec<Triple> {
-    let s = &data.series[run];
-    let n = s.len();
-    let height = |c: usize, k: usize| match hat(knots, u[k]) {
-        Some((at, w)) if at == c => 1.0 - w,
-        Some((at, w)) if at + 1 == c => w,
-        _ => 0.0,
-    };
-    (0..knots.len())
-        .map(|c| {
-            let mut triple = [Balance::Tyre, Balance::Wheel, Balance::Vehicle].map(|b| {
-                let formed = !s.segments(b).is_empty();
-                vec![0.0; if formed { n } else { 0 }]
-            });
-            let into = &mut triple[balance as usize];
-            let mut sum = 0.0;
-            for (k, into) in into.iter_mut().enumerate() {
-                *into = match balance {
-                    Balance::Tyre => {
-                        finite_or_zero(-height(c, k) * levers.of(data, action, run, k))
-                    }
-                    Balance::Wheel | Balance::Vehicle => {
-                        let lever = if balance == Balance::Wheel {
-                            data.context.radius
-                        } else {
-                            1.0
-                        };
-                        sum += finite_or_zero(
-                            height(c, k) * lever * data.context.mean_load * s.dt[k].min(0.1),
-                        );
-                        sum
-                    }
-                };
-            }
-            triple
-        })
-        .collect()
-}
-
 impl Dependence {
+    /// Its columns.
+    #[must_use]
+    pub fn width(&self) -> usize {
+        self.knots.len() - usize::from(self.reference.is_some())
+    }
+
+    /// Columns on one run beside the model that the levers are of: minus the lever times each hat in the tyre's row,
+    /// integrated in the others.
+    #[must_use]
+    pub fn columns(&self, data: &Data, levers: &Levers, run: usize) -> Vec<Triple> {
+        let (s, u) = (&data.series[run], &self.values[run]);
+        let n = s.len();
+        let height = |c: usize, k: usize| match hat(&self.knots, u[k]) {
+            Some((at, w)) if at == c => 1.0 - w,
+            Some((at, w)) if at + 1 == c => w,
+            _ => 0.0,
+        };
+        (0..self.knots.len())
+            .filter(|c| self.reference != Some(*c))
+            .map(|c| {
+                let mut triple = [Balance::Tyre, Balance::Wheel, Balance::Vehicle].map(|b| {
+                    let formed = !s.segments(b).is_empty();
+                    vec![0.0; if formed { n } else { 0 }]
+                });
+                let into = &mut triple[self.balance as usize];
+                let mut sum = 0.0;
+                for (k, into) in into.iter_mut().enumerate() {
+                    *into = match self.balance {
+                        Balance::Tyre => {
+                            finite_or_zero(-height(c, k) * levers.of(data, self.action, run, k))
+                        }
+                        Balance::Wheel | Balance::Vehicle => {
+                            let lever = if self.balance == Balance::Wheel {
+                                data.context.radius
+                            } else {
+                                1.0
+                            };
+                            sum += finite_or_zero(
+                                height(c, k) * lever * data.context.mean_load * s.dt[k].min(0.1),
+                            );
+                            sum
+                        }
+                    };
+                }
+                triple
+            })
+            .collect()
+    }
+
     /// The correction of a repaired model, from the columns' coefficients.
     #[must_use]
     pub fn correction(&self, data: &Data, coefficients: &[f64]) -> Correction {
+        let mut values = coefficients.to_vec();
+        if let Some(reference) = self.reference {
+            values.insert(reference, 0.0);
+        }
         Correction {
             variable: self.variable.key(data),
             acts_on: self.action.as_str().to_owned(),
             form: String::new(),
             knots: self.knots.clone(),
-            values: coefficients.to_vec(),
+            values,
             harmonics: Vec::new(),
         }
     }

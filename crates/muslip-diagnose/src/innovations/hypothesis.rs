@@ -9,8 +9,12 @@ use super::estimate::{self, Readings};
 use super::gram::{Columns, Gram, Solved, grams, solve, total};
 use super::noise::{BalanceParts, Slopes, parts};
 use super::screen::precision;
+use crate::correction::Levers;
 use crate::data::Data;
+use crate::mechanism::Balance;
 use crate::model::{Model, TYRE_BASE};
+use crate::number::finite_or_zero;
+use crate::repaired::Correction;
 
 /// A model at its best, and what it says of every run.
 #[derive(Clone)]
@@ -39,6 +43,65 @@ pub struct Judged {
     pub left: DVector<f64>,
     /// Covariance of base and terms' parameters, in the model's order.
     pub covariance: nalgebra::DMatrix<f64>,
+}
+
+impl Judged {
+    /// Coefficients of each free dependence.
+    #[must_use]
+    pub fn dependences(&self) -> Vec<(&Dependence, Vec<f64>)> {
+        let mut at = own_parameters(&self.model).len();
+        self.extra
+            .iter()
+            .map(|own| {
+                let from = at;
+                at += own.width();
+                let own_part = (from..at).map(|i| finite_or_zero(self.left[i]));
+                (own, own_part.collect())
+            })
+            .collect()
+    }
+
+    /// Free dependences of the tyre's balance as corrections.
+    #[must_use]
+    pub fn corrections(&self, data: &Data) -> Vec<Correction> {
+        self.dependences()
+            .into_iter()
+            .filter(|(own, _)| own.balance == Balance::Tyre)
+            .map(|(own, coefficients)| own.correction(data, &coefficients))
+            .collect()
+    }
+
+    /// What the corrections add to the model's reading in N, by run.
+    #[must_use]
+    pub fn corrected(&self, data: &Data) -> Vec<Vec<f64>> {
+        let mut all: Vec<Vec<f64>> = data.series.iter().map(|s| vec![0.0; s.len()]).collect();
+        let corrections = self.corrections(data);
+        if corrections.is_empty() {
+            return all;
+        }
+        let levers = Levers::new(data, &self.model);
+        for correction in &corrections {
+            for (run, sum) in all.iter_mut().enumerate() {
+                let added = correction.apply(data, &levers, run).unwrap_or_default();
+                for (sum, added) in sum.iter_mut().zip(added) {
+                    *sum += added;
+                }
+            }
+        }
+        all
+    }
+
+    /// The drag as recorded less what the corrections add, in N, by run: what is left to law and terms.
+    #[must_use]
+    pub fn drag_to_explain(&self, data: &Data) -> Vec<Vec<f64>> {
+        let mut drags: Vec<Vec<f64>> = data.series.iter().map(|s| s.drag.clone()).collect();
+        for (drag, corrected) in drags.iter_mut().zip(self.corrected(data)) {
+            for (drag, corrected) in drag.iter_mut().zip(corrected) {
+                *drag -= corrected;
+            }
+        }
+        drags
+    }
 }
 
 /// How much work a judgement may be.
@@ -138,7 +201,7 @@ struct Place {
     sum: Gram,
     /// With all columns: where the linear model would go from here.
     solved: Solved,
-    /// Twice the negative log likelihood here, the chain's nuisances alone fitted.
+    /// Twice the negative log likelihood here, free dependences and the chain's nuisances fitted.
     here: f64,
 }
 
@@ -188,7 +251,7 @@ impl Place {
             sum = total(&grams);
             solved = solve(&sum.products, &chosen, &prior)?;
         }
-        let here = solve(&sum.products, &nuisances(&table), &prior)?.rss + sum.log_variance;
+        let here = solve(&sum.products, &linear(&table, &model), &prior)?.rss + sum.log_variance;
         Some(Self {
             model,
             noise,
@@ -268,7 +331,7 @@ impl Place {
         let n = self.sum.products.nrows();
         let chosen: Vec<usize> = (1..n).collect();
         // Free dependences are linear: at their best here.
-        let linear: Vec<usize> = (1 + own_parameters(&self.model).len()..n).collect();
+        let linear = linear(&self.table, &self.model);
         let best = solve(&self.sum.products, &linear, &prior)?;
         let mut coefficients = DVector::zeros(n - 1);
         for (at, &i) in linear.iter().enumerate() {
@@ -372,9 +435,10 @@ fn touches(columns: &[Columns], which: core::ops::Range<usize>) -> bool {
         .any(|run| run[which.clone()].iter().flatten().any(|x| *x != 0.0))
 }
 
-/// Columns of the chain's nuisances.
-fn nuisances(table: &Table) -> Vec<usize> {
-    (1 + table.base..1 + table.base + table.nuisances.len()).collect()
+/// Columns whose coefficients are at their best wherever the model stands: free dependences and the chain's nuisances.
+fn linear(table: &Table, model: &Model) -> Vec<usize> {
+    let first = 1 + own_parameters(model).len();
+    (first..1 + table.base + table.nuisances.len()).collect()
 }
 
 /// Fits the sizes of a balance's noise from what they are and, where they were fitted to another model, from the

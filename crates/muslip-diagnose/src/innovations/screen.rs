@@ -18,12 +18,17 @@ pub struct Score {
     pub sizes: Vec<f64>,
 }
 
+/// Prior standard deviation of a free dependence at a knot, as a share of the friction or of the mean load.
+const FREE_STD: f64 = 0.5;
+
 /// Prior precision of a column of the table (residual included).
 #[must_use]
 pub fn precision(table: &Table, column: usize) -> f64 {
     let first = 1 + table.base;
     if column >= first && column < first + table.nuisances.len() {
         table.nuisances[column - first].powi(-2)
+    } else if column < first && column >= first - table.free {
+        FREE_STD.powi(-2)
     } else {
         0.0
     }
