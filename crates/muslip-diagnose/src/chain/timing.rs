@@ -26,21 +26,35 @@ pub struct Timing {
     pub vehicle: Late,
     /// Of the brake.
     pub brake: Late,
+    /// How late the drag is left, in s.
+    drag: f64,
 }
 
 impl Timing {
-    /// How late the drag is, in s, where all other channels are early, and alike.
+    /// A channel's lateness against the drag as recorded.
+    #[must_use]
+    pub fn against_drag(&self, late: Late) -> Late {
+        Late {
+            value: late.value - self.drag,
+            ..late
+        }
+    }
+
+    /// How late the drag is, in s, where a speed and all other channels are early, and alike.
     fn drag_late(&self) -> Option<f64> {
         let all = [self.wheel, self.vehicle, self.brake];
         let known = || all.iter().filter(|l| l.std < VAGUE_S);
         let weight: f64 = known().map(|l| l.std.powi(-2)).sum();
         let mean = known().map(|l| -l.value * l.std.powi(-2)).sum::<f64>() / weight;
         let alike = |l: &Late| (-l.value - mean).abs() < ALIKE * mean + ALIKE_S + 2.0 * l.std;
-        (weight > 0.0 && mean > LEAST_DRAG_LATE_S && known().all(alike)).then_some(mean)
+        // A brake alone says as little of the drag as the drag does of it.
+        let speed = [self.wheel, self.vehicle].iter().any(|l| l.std < VAGUE_S);
+        (speed && mean > LEAST_DRAG_LATE_S && known().all(alike)).then_some(mean)
     }
 
     /// Leaves the drag as late as it is against all others.
     fn leave(&mut self, drag: f64) {
+        self.drag = drag;
         self.late.wheel += drag;
         self.late.vehicle += drag;
         self.late.brake += drag;
@@ -225,10 +239,14 @@ pub fn timed(
         let judged = judge(&data, &model, &[], before, effort)?;
         let (shift, std) = shifts(&data, &judged)?;
         let late = &timing.late;
+        // A shift by a rate that is mostly noise says less than the audit does.
         let [wheel, vehicle, brake] = [
-            late.wheel + late.wheel_by_turn + shift[0] + shift[3],
-            late.vehicle + shift[1],
-            late.brake + shift[2],
+            within(
+                &audit.wheel_late,
+                late.wheel + late.wheel_by_turn + shift[0] + shift[3],
+            ),
+            within(&audit.vehicle_late, late.vehicle + shift[1]),
+            within(&audit.brake_late, late.brake + shift[2]),
         ];
         timing.wheel = Late {
             value: wheel,
@@ -344,4 +362,41 @@ fn shifts(data: &Data, judged: &Judged) -> Option<([f64; 4], [f64; 3])> {
     let of = [reliable[0], reliable[1], reliable[2], reliable[0]];
     let shift = core::array::from_fn(|i| all.coefficients[first + i] / of[i]);
     Some((shift, std))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn timing(wheel: f64, vehicle: f64, brake: f64) -> Timing {
+        let late = |value| Late { value, std: 3e-4 };
+        Timing {
+            wheel: late(wheel),
+            vehicle: late(vehicle),
+            brake: late(brake),
+            ..Timing::default()
+        }
+    }
+
+    #[test]
+    fn a_drag_that_all_channels_precede_alike_is_late() {
+        let late = timing(-0.010, -0.011, -0.010).drag_late();
+        assert!((late.unwrap() - 0.0103).abs() < 5e-4);
+        assert_eq!(timing(0.010, 0.011, 0.010).drag_late(), None);
+    }
+
+    #[test]
+    fn a_brake_alone_that_is_read_early_says_nothing_of_the_drag() {
+        let mut alone = timing(-0.02, -0.02, -0.035);
+        (alone.wheel.std, alone.vehicle.std) = (0.01, f64::INFINITY);
+        assert!(alone.drag_late().is_none() && alone.brake_early());
+    }
+
+    #[test]
+    fn a_delay_is_told_against_the_drag_as_recorded() {
+        let mut timing = timing(-0.004, 0.03, -0.006);
+        timing.leave(0.006);
+        assert!((timing.vehicle.value - 0.036).abs() < 1e-12);
+        assert!((timing.against_drag(timing.vehicle).value - 0.03).abs() < 1e-12);
+    }
 }

@@ -223,8 +223,7 @@ impl<'a> Answer<'a> {
 
     /// The diagnosis, proven by what the argument came to without what was kept for that.
     fn assemble(&self, kept: &Split, proof: Predicting) -> Diagnosis {
-        let mut mechanisms = self.named();
-        mechanisms.extend(self.named_delays());
+        let mut mechanisms = self.mechanisms();
         let mut found = self.repaired();
         found.proof = proof;
         found.proof_by_blocks = kept.by_block;
@@ -253,7 +252,6 @@ impl<'a> Answer<'a> {
                 }
             }
         }
-        mechanisms.sort_by(|a, b| b.evidence.delta_bic.total_cmp(&a.evidence.delta_bic));
         let unexplained = self.unexplained();
         let verdict = match (mechanisms.is_empty(), unexplained.is_empty()) {
             (true, true) => Verdict::Consistent,

@@ -29,7 +29,16 @@ pub(super) fn least_delay(late: &Timing) -> f64 {
 }
 
 impl Answer<'_> {
-    pub(super) fn named(&self) -> Vec<NamedMechanism> {
+    /// All that is named, strongest first.
+    pub(super) fn mechanisms(&self) -> Vec<NamedMechanism> {
+        let mut all = self.named();
+        all.extend(self.named_delays());
+        all.sort_by(|a, b| b.evidence.delta_bic.total_cmp(&a.evidence.delta_bic));
+        all
+    }
+
+    /// Names of the decision.
+    fn named(&self) -> Vec<NamedMechanism> {
         let chosen = &self.decision.chosen;
         let covariance = self.covariance(chosen);
         chosen
@@ -60,7 +69,7 @@ impl Answer<'_> {
                         .map(|(r, std)| Figure::new(r, *std))
                         .collect(),
                     evidence: Evidence {
-                        delta_bic: 2.0 * trial.gain,
+                        delta_bic: 2.0 * trial.weight(),
                         holdout_nll_gain_per_sample: finite_or_zero(
                             trial.unseen.0 * self.data.series.len() as f64 / samples.max(1) as f64,
                         ),
@@ -127,8 +136,8 @@ impl Answer<'_> {
     /// What the timing says of a delay that is its own to name.
     pub(super) fn delay_of(&self, id: Id) -> Option<Timing> {
         match id {
-            Id::WheelSpeedDelay => Some(self.timing.wheel),
-            Id::VehicleSpeedDelay => Some(self.timing.vehicle),
+            Id::WheelSpeedDelay => Some(self.timing.against_drag(self.timing.wheel)),
+            Id::VehicleSpeedDelay => Some(self.timing.against_drag(self.timing.vehicle)),
             _ => None,
         }
     }
@@ -169,7 +178,7 @@ fn surest(runs: usize) -> f64 {
 
 /// How sure a name is: against the other finalists of its round, against none, and by what so many runs can show.
 fn confidence(trial: &Trial, round: &[Trial], runs: usize) -> (f64, Vec<Alternative>) {
-    let softness = SOFTNESS + SOFT_SHARE * trial.gain.max(0.0);
+    let softness = SOFTNESS + SOFT_SHARE * trial.weight();
     // What predicts the drag worse is less likely however much it gains, for the chain's nuisances may do its work.
     let worse = |t: &Trial| {
         let by = trial.predicts - t.predicts;
@@ -179,7 +188,7 @@ fn confidence(trial: &Trial, round: &[Trial], runs: usize) -> (f64, Vec<Alternat
             0.0
         }
     };
-    let weight = |t: &Trial| (((t.gain - trial.gain) / softness).min(0.0) - worse(t)).exp();
+    let weight = |t: &Trial| (((t.weight() - trial.weight()) / softness).min(0.0) - worse(t)).exp();
     let mut by_id: BTreeMap<Id, f64> = BTreeMap::new();
     let own = trial.mechanism().map(|m| m.0);
     let mut outside = 0.0f64;
@@ -195,9 +204,9 @@ fn confidence(trial: &Trial, round: &[Trial], runs: usize) -> (f64, Vec<Alternat
             None => outside = outside.max(0.5 * weight(other)),
         }
     }
-    let none = (-(trial.gain / softness)).exp();
+    let none = (-(trial.weight() / softness)).exp();
     let total = by_id.values().sum::<f64>() + none + outside;
-    let steady = 1.0 - (-0.8 * (trial.unseen.1 - 0.5)).exp();
+    let steady = 1.0 - (-0.8 * (trial.steadiness() - 0.5)).exp();
     let own_share = own.and_then(|id| by_id.get(&id).copied()).unwrap_or(1.0) / total;
     let mut others: Vec<Alternative> = by_id
         .iter()

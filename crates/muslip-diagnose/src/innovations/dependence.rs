@@ -27,7 +27,7 @@ pub struct Dependence {
     pub action: Action,
     /// Knots of the hat functions.
     pub knots: Vec<f64>,
-    /// The knot at which a dependence of friction is one: the law's own peak friction holds there.
+    /// The knot at which a dependence of friction is one: the law's own peak friction holds there. The fullest one.
     reference: Option<usize>,
     /// The variable by run and sample.
     values: Vec<Vec<f64>>,
@@ -60,6 +60,23 @@ fn knots(data: &Data, values: &[Vec<f64>], balance: Balance, count: usize) -> Ve
     }
 }
 
+/// The knot that most samples are about: beside one that nothing is known of, the law could be anything.
+fn fullest(data: &Data, values: &[Vec<f64>], balance: Balance, knots: &[f64]) -> usize {
+    let mut about = vec![0.0; knots.len()];
+    for (s, u) in data.series.iter().zip(values) {
+        for k in s.segments(balance).iter().flat_map(Clone::clone) {
+            if let Some((at, w)) = hat(knots, u[k]) {
+                about[at] += 1.0 - w;
+                if let Some(next) = about.get_mut(at + 1) {
+                    *next += w;
+                }
+            }
+        }
+    }
+    let fullest = (0..knots.len()).max_by(|a, b| about[*a].total_cmp(&about[*b]));
+    fullest.unwrap_or(0)
+}
+
 /// All dependences that a campaign can show.
 #[must_use]
 pub fn all(data: &Data) -> Vec<Dependence> {
@@ -89,12 +106,14 @@ pub fn all(data: &Data) -> Vec<Dependence> {
                 .iter()
                 .flat_map(|a| shapes.iter().map(move |k| (a, k)))
             {
+                let reference =
+                    (action == Action::Friction).then(|| fullest(data, &values, balance, knots));
                 out.push(Dependence {
                     balance,
                     variable: variable.clone(),
                     action,
                     knots: knots.clone(),
-                    reference: (action == Action::Friction).then_some(knots.len() / 2),
+                    reference,
                     values: values.clone(),
                 });
             }

@@ -31,10 +31,8 @@ pub struct Judged {
     pub free: usize,
     /// Inner products of base, terms and nuisances by half run: `[run][half]`.
     pub grams: Vec<[Gram; 2]>,
-    /// Negative log likelihood of each run under parameters from all others.
-    pub unseen: Vec<f64>,
-    /// The same of each half run under parameters from all other halves.
-    pub unseen_halves: Vec<f64>,
+    /// What it says of runs that it was not fitted to.
+    pub unseen: Unseen,
     /// Nuisances of the chain among the columns, the last ones.
     pub nuisances: usize,
     /// Prior precision by column of the grams.
@@ -45,7 +43,25 @@ pub struct Judged {
     pub covariance: nalgebra::DMatrix<f64>,
 }
 
+/// How likely a model makes what it was not fitted to, in nats.
+#[derive(Clone)]
+pub struct Unseen {
+    /// Negative log likelihood of each run under parameters from all others.
+    pub runs: Vec<f64>,
+    /// The same of each half run under parameters from all other halves.
+    pub halves: Vec<f64>,
+}
+
 impl Judged {
+    /// What it says of unseen runs where this were the noise.
+    #[must_use]
+    pub fn unseen_under(&self, data: &Data, noise: &[BalanceParts]) -> Option<Unseen> {
+        let slopes = Slopes::new(data, &self.model.base);
+        let table = table_of(data, &self.model, &slopes, &self.extra);
+        let grams = table_grams(data, noise, &table);
+        unseen(data, &self.model, &table, &grams)
+    }
+
     /// Coefficients of each free dependence.
     #[must_use]
     pub fn dependences(&self) -> Vec<(&Dependence, Vec<f64>)> {
@@ -192,6 +208,12 @@ fn with_sizes(mut fresh: Vec<BalanceParts>, old: &[BalanceParts]) -> Vec<Balance
     fresh
 }
 
+/// Columns of a model that nothing is to be added to.
+fn table_of(data: &Data, model: &Model, slopes: &Slopes, extra: &[Dependence]) -> Table {
+    let none = vec![crate::mechanism::Evidence::default(); data.series.len()];
+    table(data, model, slopes, &none, extra, &[], &|_| false)
+}
+
 /// A model at one place of its parameters under noise of some sizes.
 struct Place {
     model: Model,
@@ -221,8 +243,7 @@ impl Place {
             Some(old) => with_sizes(fresh, old),
             None => fresh,
         };
-        let none = vec![crate::mechanism::Evidence::default(); data.series.len()];
-        let table = table(data, &model, &slopes, &none, extra, &[], &|_| false);
+        let table = table_of(data, &model, &slopes, extra);
         let prior = |i: usize| precision(&table, i);
         if let Some(effort) = fitted {
             for part in &mut noise {
@@ -329,7 +350,6 @@ impl Place {
     fn judged(self, data: &Data, extra: &[Dependence]) -> Option<Judged> {
         let prior = |i: usize| precision(&self.table, i);
         let n = self.sum.products.nrows();
-        let chosen: Vec<usize> = (1..n).collect();
         // Free dependences are linear: at their best here.
         let linear = linear(&self.table, &self.model);
         let best = solve(&self.sum.products, &linear, &prior)?;
@@ -338,19 +358,6 @@ impl Place {
             coefficients[i - 1] = best.coefficients[at];
         }
         let penalty: f64 = self.noise.iter().map(estimate::penalty).sum();
-        let bounds = bounds(data, &self.model);
-        let own: Vec<usize> = own_parameters(&self.model);
-        let wide = |i: usize| match own.get(i - 1) {
-            Some(&p) => (SHARE_OF_RANGE * (bounds[p].1 - bounds[p].0)).powi(-2),
-            None => prior(i),
-        };
-        let all = solve(&self.sum.products, &chosen, &wide)?;
-        let unseen = |own: &Gram| outside(own, &self.sum, &all, &chosen, &wide);
-        let runs = self
-            .grams
-            .iter()
-            .map(|run| unseen(&total(core::slice::from_ref(run))));
-        let halves = self.grams.iter().flatten().map(unseen);
         let k = own_parameters(&self.model).len();
         Some(Judged {
             loss: 0.5 * (self.sum.log_variance + best.rss) + penalty,
@@ -360,8 +367,7 @@ impl Place {
             nuisances: self.table.nuisances.len(),
             prior: (0..n).map(prior).collect(),
             left: coefficients.clone(),
-            unseen: runs.collect::<Option<_>>()?,
-            unseen_halves: halves.collect::<Option<_>>()?,
+            unseen: unseen(data, &self.model, &self.table, &self.grams)?,
             model: self.model,
             parts: self.noise,
             grams: self.grams,
@@ -510,6 +516,28 @@ pub fn judge(
     .refitted(data, extra, effort, added)?
     .descended(data, extra, effort.steps.div_ceil(2))?
     .judged(data, extra)
+}
+
+/// What a model says of every run and half run that it were not fitted to.
+fn unseen(data: &Data, model: &Model, table: &Table, grams: &[[Gram; 2]]) -> Option<Unseen> {
+    let sum = total(grams);
+    let chosen: Vec<usize> = (1..sum.products.nrows()).collect();
+    let bounds = bounds(data, model);
+    let own = own_parameters(model);
+    let wide = |i: usize| match own.get(i - 1) {
+        Some(&p) => (SHARE_OF_RANGE * (bounds[p].1 - bounds[p].0)).powi(-2),
+        None => precision(table, i),
+    };
+    let all = solve(&sum.products, &chosen, &wide)?;
+    let of = |own: &Gram| outside(own, &sum, &all, &chosen, &wide);
+    let runs = grams
+        .iter()
+        .map(|run| of(&total(core::slice::from_ref(run))));
+    let halves = grams.iter().flatten().map(of);
+    Some(Unseen {
+        runs: runs.collect::<Option<_>>()?,
+        halves: halves.collect::<Option<_>>()?,
+    })
 }
 
 /// Negative log likelihood of a part of the readings, given all others: parameters that the others do not know are as

@@ -68,11 +68,13 @@ impl Describe for SpeedSensitivity {
         let slope = Parameter::new("friction_change_per_m_s", "s/m", -steepest, steepest);
         match self.form {
             Form::Stribeck => vec![
-                Parameter::new("floor", "1", 0.05, 2.5),
+                // Friction falls towards the floor (Stribeck), over more than the first hundredths of slip: what rises there,
+                // or is that short, is what timing and smoothing leave of the curve's beginning.
+                Parameter::new("floor", "1", 0.05, 1.0),
                 Parameter::new(
                     "speed_scale",
                     "m/s",
-                    0.01 * context.max_speed,
+                    0.03 * context.max_speed,
                     3.0 * context.max_speed,
                 ),
             ],

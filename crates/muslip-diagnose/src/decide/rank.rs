@@ -1,0 +1,91 @@
+//! The order of a round's trials.
+
+use super::trial::{Claim, Trial};
+use crate::data::Data;
+
+/// Gains in nats that differ by less are alike.
+pub const ALIKE_NATS: f64 = 0.5;
+/// Of names that gain alike, to this share, the one comes first that predicts the drag better by this logarithm.
+const ALIKE_SHARE: f64 = 0.7;
+pub const PREDICTED_APART: f64 = 0.1;
+
+/// Best first; of those that gain alike, the one first that claims the least.
+pub fn rank(data: &Data, trials: &mut [Trial]) {
+    let order = |a: &Trial, b: &Trial| b.weight().total_cmp(&a.weight());
+    trials.sort_by(|a, b| order(a, b).then(b.gain.total_cmp(&a.gain)));
+    least_claims_first(trials, Trial::weight, |t| balances(data, t));
+    better_predicted_first(trials, Trial::weight, |t| t.predicts);
+}
+
+/// Of those that gain much the same and work through the force, the one first that predicts the drag clearly better.
+fn better_predicted_first<T>(
+    best_first: &mut [T],
+    gain: impl Fn(&T) -> f64,
+    predicts: impl Fn(&T) -> f64,
+) {
+    let alike = |own: &T, other: &T| gain(own) > ALIKE_SHARE * gain(other);
+    let better = |own: &T, other: &T| predicts(own) > predicts(other) + PREDICTED_APART;
+    sort_neighbours(best_first, |own, other| {
+        alike(own, other) && predicts(own).is_finite() && better(own, other)
+    });
+}
+
+/// Balances that a trial's claim is about.
+fn balances(data: &Data, trial: &Trial) -> usize {
+    match trial.claim {
+        Claim::Mechanism(_, entry) => data.catalogue.get(entry).guide().touches.len(),
+        Claim::Dependence(_) => 1,
+    }
+}
+
+/// Of neighbours that gain alike, the one first that claims the least: a mass in error says less than a drag
+/// channel's scale in error, which all balances would show if they could.
+fn least_claims_first<T>(
+    best_first: &mut [T],
+    gain: impl Fn(&T) -> f64,
+    claims: impl Fn(&T) -> usize,
+) {
+    sort_neighbours(best_first, |own, other| {
+        gain(other) - gain(own) < ALIKE_NATS && claims(own) < claims(other)
+    });
+}
+
+/// Lets each go before the one next to it, again and again, as long as it `precedes` that: for orders that hold
+/// between neighbours only.
+fn sort_neighbours<T>(all: &mut [T], precedes: impl Fn(&T, &T) -> bool) {
+    for from in 1..all.len() {
+        let mut at = from;
+        while at > 0 && precedes(&all[at], &all[at - 1]) {
+            all.swap(at - 1, at);
+            at -= 1;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn of_those_that_gain_much_the_same_the_one_that_predicts_clearly_better_comes_first() {
+        // Gain and prediction: what gains less than 0.7 of another, or predicts but little better, stays behind it.
+        let mut all = [
+            (400.0, 1.0),
+            (330.0, 1.4),
+            (310.0, 1.45),
+            (100.0, 9.0),
+            (90.0, f64::INFINITY),
+        ];
+        better_predicted_first(&mut all, |t| t.0, |t| t.1);
+        let gains = all.map(|t| t.0);
+        assert_eq!(gains, [330.0, 310.0, 400.0, 100.0, 90.0]);
+    }
+
+    #[test]
+    fn of_two_that_gain_alike_the_one_that_claims_less_comes_first() {
+        // Gain and claims: only neighbours within half a nat change places.
+        let mut all = [(40.0, 1), (35.2, 3), (35.0, 1), (34.9, 2), (12.0, 1)];
+        least_claims_first(&mut all, |t| t.0, |t| t.1);
+        assert_eq!(all, [(40.0, 1), (35.0, 1), (34.9, 2), (35.2, 3), (12.0, 1)]);
+    }
+}

@@ -1,0 +1,375 @@
+//! What a claim gains beside the model so far, and whether it stands.
+
+use crate::data::Data;
+use crate::innovations::dependence::Dependence;
+use crate::innovations::hypothesis::{Judged, Unseen, capped};
+use crate::innovations::noise::BalanceParts;
+use crate::law::{closest, left_of};
+use crate::mechanism::{Balance, Id};
+use crate::model::Model;
+
+/// Price of a free parameter in nats: about half the logarithm of the independent readings.
+pub const PRICE_OF_PARAMETER: f64 = 4.0;
+/// Price of a choice among the vocabulary in nats.
+pub const PRICE_OF_NAME: f64 = 3.4;
+/// Least gain in nats, all prices taken off.
+pub const LEAST_GAIN: f64 = 5.0;
+/// Least effect that is worth a name, as a share of one whitened reading's standard deviation: of the gain, half
+/// its square a reading.
+const LEAST_EFFECT: f64 = 0.07;
+/// Least t of the gains on unseen runs: about Student's at five percent, one-sided, for as many runs as campaigns have.
+const LEAST_T: f64 = 2.0;
+/// Where the runs' own differences hide an effect: least gain in nats at the noise that the sensors make plausible, and
+/// least t of its signed roots. What measuring chains leave gains less, or unevenly.
+const LEAST_GAIN_AT_SENSORS: f64 = 20.0;
+const LEAST_T_AT_SENSORS: f64 = 4.0;
+/// The same of a free dependence, which has more parameters and follows more of what chains leave.
+const LEAST_OF_DEPENDENCE_AT_SENSORS: (f64, f64) = (150.0, 2.4);
+/// Logarithm by which a hidden dependence lowers the mean square error of the drag at least.
+const LEAST_PREDICTED_BY_DEPENDENCE: f64 = 0.05;
+/// Least t of a free dependence's gains on unseen runs: it says nothing of what it is.
+const LEAST_T_OF_DEPENDENCE: f64 = 3.0;
+/// Least gain of a free dependence over that of the least effect worth a name.
+const DEPENDENCE_WORTH: f64 = 3.0;
+/// Logarithm by which a memory that the chain might have lowers the mean square error of the drag, and the least t of its
+/// gains, where it is real: kernels that differ lower none.
+const REAL_MEMORY: (f64, f64) = (0.25, 2.5);
+/// Least memory in s that is told from a chain without any error of timing.
+const LEAST_MEMORY_S: f64 = 2.5e-3;
+/// Least logarithm by which a name that works through the force lowers the mean square error of the drag.
+const LEAST_PREDICTED: f64 = 0.01;
+
+/// What a trial adds to a model.
+#[derive(Clone)]
+pub enum Claim {
+    /// A mechanism of the vocabulary, by its entry of the catalogue.
+    Mechanism(Id, usize),
+    /// A free dependence on a variable.
+    Dependence(Dependence),
+}
+
+/// A claim as it stands against the model without it.
+#[derive(Clone)]
+pub struct Trial {
+    /// Which.
+    pub claim: Claim,
+    /// Gain in nats, prices taken off.
+    pub gain: f64,
+    /// Mean gain on unseen runs in nats, and its t over the runs.
+    pub unseen: (f64, f64),
+    /// Gain on all unseen runs in nats if the noise were no larger than the sensors make plausible, and the t of the
+    /// runs' gains under the root, signs kept: they are as uneven as the runs.
+    pub at_sensors: (f64, f64),
+    /// Whether nothing was named before it in its balance, errors of the speeds left aside: what a name leaves is
+    /// easily that name's own form.
+    pub first: bool,
+    /// Whether its memory is longer than what the chain's own timing was off by.
+    pub outlasts_chain: bool,
+    /// Readings in the balances that are judged.
+    pub readings: usize,
+    /// Gain in nats if the noise were no larger than the sensors make plausible: how large the effect is, whatever
+    /// the runs' own differences hide of it.
+    pub size: f64,
+    /// By how much the model with it predicts the drag better: minus the mean over runs of the logarithm of the mean
+    /// square error over that without it. Infinite for what does not work through the force.
+    pub predicts: f64,
+    /// The model with it.
+    pub judged: Judged,
+}
+
+impl Trial {
+    /// The mechanism, where it is one.
+    #[must_use]
+    pub fn mechanism(&self) -> Option<(Id, usize)> {
+        match &self.claim {
+            Claim::Mechanism(id, entry) => Some((*id, *entry)),
+            Claim::Dependence(_) => None,
+        }
+    }
+
+    /// The balance that its claim is of.
+    pub fn balance(&self, data: &Data) -> Balance {
+        balance_of(data, &self.claim)
+    }
+
+    /// How much speaks for it at both levels of the noise: the geometric mean of its gains.
+    #[must_use]
+    pub fn weight(&self) -> f64 {
+        (self.gain.max(0.0) * self.at_sensors.0.max(0.0)).sqrt()
+    }
+
+    /// How alike the runs speak for it: the larger t of the two levels, one of signed roots being about twice the plain
+    /// one.
+    #[must_use]
+    pub fn steadiness(&self) -> f64 {
+        self.unseen.1.max(0.5 * self.at_sensors.1)
+    }
+
+    /// Sets it against another state of the model without it.
+    pub fn set_against(&mut self, data: &Data, before: &Judged, base: &Judged) {
+        self.gain -= before.loss - base.loss;
+        let own = gains(
+            &base.unseen,
+            &self.judged.unseen,
+            is_per_run(data, &self.claim),
+        );
+        self.unseen = mean_and_t(&own);
+    }
+}
+
+/// What belongs to a run cannot be carried to another: its first half tells its second.
+fn is_per_run(data: &Data, claim: &Claim) -> bool {
+    match claim {
+        Claim::Mechanism(_, entry) => data.catalogue.get(*entry).form().contains("per_run"),
+        Claim::Dependence(_) => false,
+    }
+}
+
+fn balance_of(data: &Data, claim: &Claim) -> Balance {
+    match claim {
+        Claim::Mechanism(_, entry) => data.catalogue.get(*entry).id().balance(),
+        Claim::Dependence(own) => own.balance,
+    }
+}
+
+/// What each unseen run gains; half runs where a parameter belongs to its run.
+fn gains(base: &Unseen, with: &Unseen, halves: bool) -> Vec<f64> {
+    let (a, b) = if halves {
+        (&base.halves, &with.halves)
+    } else {
+        (&base.runs, &with.runs)
+    };
+    a.iter()
+        .zip(b)
+        .map(|(a, b)| a - b)
+        .filter(|g| g.is_finite() && *g != 0.0)
+        .collect()
+}
+
+/// Mean and t over the runs.
+fn mean_and_t(gains: &[f64]) -> (f64, f64) {
+    let n = gains.len() as f64;
+    if gains.is_empty() {
+        return (0.0, 0.0);
+    }
+    let mean = gains.iter().sum::<f64>() / n;
+    if gains.len() < 2 {
+        return (mean, if mean > 0.0 { LEAST_T } else { 0.0 });
+    }
+    let spread = (gains.iter().map(|g| (g - mean).powi(2)).sum::<f64>() / (n - 1.0)).sqrt();
+    (mean, mean / spread.max(1e-9) * n.sqrt())
+}
+
+/// Sum, and t of the signed roots.
+fn sum_and_t(gains: &[f64]) -> (f64, f64) {
+    let roots: Vec<f64> = gains.iter().map(|g| g.signum() * g.abs().sqrt()).collect();
+    (gains.iter().sum(), mean_and_t(&roots).1)
+}
+
+/// The model so far, as what a trial adds to it is weighed against it.
+pub struct Before<'a> {
+    data: &'a Data,
+    judged: &'a Judged,
+    /// What the chain's own timing was off by, in s.
+    chain_s: f64,
+    /// Sum of squares of the drag that its best law leaves, by run.
+    squares: Vec<f64>,
+    /// The noise no larger than the sensors make plausible, and what it says of unseen runs under that.
+    at_sensors: (Vec<BalanceParts>, Option<Unseen>),
+}
+
+impl<'a> Before<'a> {
+    pub fn new(data: &'a Data, judged: &'a Judged, chain_s: f64) -> Self {
+        let noise = capped(&judged.parts);
+        let unseen = judged.unseen_under(data, &noise);
+        Self {
+            data,
+            judged,
+            chain_s,
+            squares: squares_by_best_law(data, judged),
+            at_sensors: (noise, unseen),
+        }
+    }
+
+    pub fn tried(&self, claim: Claim, judged: Judged, size: f64) -> Trial {
+        let (data, base) = (self.data, self.judged);
+        let free = judged.free as f64 - base.free as f64;
+        let per_run = is_per_run(data, &claim);
+        let counts = judged.grams.iter().flatten().map(|g| g.count);
+        let readings = counts.sum::<usize>() / judged.parts.len().max(1);
+        let balance = balance_of(data, &claim);
+        let first = !base.model.terms.iter().any(|t| {
+            let id = data.catalogue.get(t.entry).id();
+            id.balance() == balance && (balance != Balance::Tyre || through_force(id))
+        });
+        let in_force = match &claim {
+            Claim::Mechanism(id, _) => through_force(*id),
+            Claim::Dependence(own) => own.balance == Balance::Tyre,
+        };
+        let predicts = if in_force {
+            self.predicted_better(&judged)
+        } else {
+            f64::INFINITY
+        };
+        let at_sensors = self.gained_at_sensors(&judged, per_run);
+        let outlasts_chain = match &claim {
+            Claim::Mechanism(id, entry) => {
+                let least = least_memory_s(data, *id, *entry);
+                let (lower, t) = REAL_MEMORY;
+                let real = in_force && predicts > lower && at_sensors.1 > t;
+                let chain_s = if real { 0.0 } else { self.chain_s };
+                memory_s(data, *id, *entry, &judged.model)
+                    .is_none_or(|memory| memory > least.max(chain_s))
+            }
+            Claim::Dependence(_) => true,
+        };
+        Trial {
+            claim,
+            gain: base.loss - judged.loss - PRICE_OF_PARAMETER * free - PRICE_OF_NAME,
+            unseen: mean_and_t(&gains(&base.unseen, &judged.unseen, per_run)),
+            at_sensors,
+            first,
+            outlasts_chain,
+            predicts,
+            readings,
+            size,
+            judged,
+        }
+    }
+
+    fn gained_at_sensors(&self, with: &Judged, per_run: bool) -> (f64, f64) {
+        let (noise, before) = &self.at_sensors;
+        match (before, with.unseen_under(self.data, noise)) {
+            (Some(before), Some(with)) => sum_and_t(&gains(before, &with, per_run)),
+            _ => (0.0, 0.0),
+        }
+    }
+
+    /// Minus the mean over runs of the logarithm of the mean square error of the drag by this model over that by the
+    /// one before.
+    fn predicted_better(&self, with: &Judged) -> f64 {
+        let after = squares_by_best_law(self.data, with);
+        let ratios: Vec<f64> = self
+            .squares
+            .iter()
+            .zip(after)
+            .map(|(before, after)| (before / after).ln())
+            .filter(|ratio| ratio.is_finite())
+            .collect();
+        ratios.iter().sum::<f64>() / ratios.len().max(1) as f64
+    }
+}
+
+/// Sum of squares of the drag that a model leaves, by run, with the law that predicts best and nothing of the chain's
+/// nuisances: those may stand for an effect.
+fn squares_by_best_law(data: &Data, judged: &Judged) -> Vec<f64> {
+    let drags = judged.drag_to_explain(data);
+    let best = closest(data, &judged.model, &drags);
+    let runs = data.series.iter().enumerate();
+    runs.map(|(run, s)| s.tyre_square(&left_of(data, &best, run, &drags[run])))
+        .collect()
+}
+
+/// Whether a mechanism works through the force that is predicted.
+#[must_use]
+pub fn through_force(id: Id) -> bool {
+    let timing = matches!(
+        id,
+        Id::EffectiveRadius | Id::EncoderRipple | Id::WheelSpeedDelay | Id::VehicleSpeedDelay
+    );
+    id.balance() == Balance::Tyre && !timing
+}
+
+/// Shortest memory in s that is named: a filtered reading of the brake holds less noise than the reading itself, which
+/// looks like a short lag, so there its descriptor's smallest useful effect holds.
+fn least_memory_s(data: &Data, id: Id, entry: usize) -> f64 {
+    if id.balance() == Balance::Wheel {
+        (data.catalogue.get(entry).guide().smallest_size)(&data.context)
+    } else {
+        LEAST_MEMORY_S
+    }
+}
+
+/// Memory of a mechanism in s, where it has one.
+fn memory_s(data: &Data, id: Id, entry: usize, model: &Model) -> Option<f64> {
+    let term = model.terms.iter().find(|t| t.entry == entry)?;
+    let first = *term.parameters.first()?;
+    match id {
+        Id::BrakeLag | Id::ForceLag | Id::ForceDelay => Some(first),
+        Id::RelaxationLength => Some(first / data.context.mean_speed),
+        Id::StructuralResonance => Some(1.0 / (core::f64::consts::TAU * first)),
+        _ => None,
+    }
+}
+
+/// Whether a trial stands.
+#[must_use]
+pub fn stands(trial: &Trial) -> bool {
+    let worth = 0.5 * LEAST_EFFECT * LEAST_EFFECT * trial.readings as f64;
+    let worth_it = trial.size > worth;
+    let least_gain = if trial.mechanism().is_some() {
+        LEAST_GAIN
+    } else {
+        DEPENDENCE_WORTH * worth
+    };
+    let seen = trial.gain > least_gain && seen_on_unseen_runs(trial);
+    let hidden = trial.first && trial.gain > 0.0 && seen_at_sensors(trial);
+    let predicts = trial.predicts > LEAST_PREDICTED;
+    (seen || hidden) && worth_it && trial.outlasts_chain && predicts
+}
+
+/// Whether unseen runs gain, and alike, where their own differences are no larger than sensors make plausible.
+fn seen_at_sensors(trial: &Trial) -> bool {
+    let (sum, t) = trial.at_sensors;
+    if trial.mechanism().is_some() {
+        return sum > LEAST_GAIN_AT_SENSORS && t > LEAST_T_AT_SENSORS;
+    }
+    let (least, least_t) = LEAST_OF_DEPENDENCE_AT_SENSORS;
+    let predicts = trial.predicts > LEAST_PREDICTED_BY_DEPENDENCE;
+    predicts && sum > least && t > least_t
+}
+
+/// Whether unseen runs gain, and alike.
+fn seen_on_unseen_runs(trial: &Trial) -> bool {
+    let (mean, t) = trial.unseen;
+    let least = match trial.claim {
+        Claim::Mechanism(..) => LEAST_T,
+        Claim::Dependence(_) => LEAST_T_OF_DEPENDENCE,
+    };
+    mean > 0.0 && t >= least
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn unseen(runs: &[f64], halves: &[f64]) -> Unseen {
+        Unseen {
+            runs: runs.to_vec(),
+            halves: halves.to_vec(),
+        }
+    }
+
+    #[test]
+    fn a_claim_gains_what_unseen_runs_lose_in_likelihood_without_it() {
+        let (before, with) = (
+            unseen(&[10.0, 12.0], &[5.0, 5.0, 6.0, 6.0]),
+            unseen(&[7.0, 13.0], &[5.0, 4.0, 6.5, 6.0]),
+        );
+        assert_eq!(gains(&before, &with, false), [3.0, -1.0]);
+        // Halves that the claim says nothing of are no evidence either way.
+        assert_eq!(gains(&before, &with, true), [1.0, -0.5]);
+    }
+
+    #[test]
+    fn the_t_of_gains_is_students_and_that_of_their_roots_bears_uneven_runs() {
+        let (mean, t) = mean_and_t(&[1.0, 2.0, 3.0, 4.0]);
+        // Mean 2.5, standard deviation 1.2910, over four runs.
+        assert!((mean - 2.5).abs() < 1e-12 && (t - 2.5 / 1.290_994 * 2.0).abs() < 1e-5);
+        let (sum, roots) = sum_and_t(&[4.0, 4.0, 400.0, 9.0]);
+        assert!((sum - 417.0).abs() < 1e-12);
+        let (_, plain) = mean_and_t(&[4.0, 4.0, 400.0, 9.0]);
+        assert!(roots > 1.4 * plain, "{roots} {plain}");
+        assert!(sum_and_t(&[-4.0, 4.0, -9.0, 9.0]).1.abs() < 1e-12);
+    }
+}
