@@ -8,9 +8,7 @@ use crate::data::Data;
 use crate::innovations::candidates::{Candidate, Table, table};
 use crate::innovations::dependence::Dependence;
 use crate::innovations::gram::total;
-use crate::innovations::hypothesis::{
-    Effort, Guess, Judged, capped, judge, noise_stride, table_grams,
-};
+use crate::innovations::hypothesis::{Effort, Guess, Judged, judge, noise_stride, table_grams};
 use crate::innovations::noise::Slopes;
 use crate::innovations::rows::rows_of;
 use crate::innovations::screen::{Score, scores};
@@ -83,14 +81,24 @@ fn gain_at_start(data: &Data, candidate: &Candidate, score: &Score) -> f64 {
     }
 }
 
-/// Best candidates of a screen: at most `count` ids, at most two forms of each, each form at its best start.
-fn best(data: &Data, table: &Table, all: &[Score], count: usize) -> Vec<(usize, Score)> {
+/// Best candidates of a screen but of the ids passed over: at most `count` ids, at most two forms of each, each form at
+/// its best start.
+fn best(
+    data: &Data,
+    table: &Table,
+    all: &[Score],
+    count: usize,
+    passed: &[Id],
+) -> Vec<(usize, Score)> {
     let at_start = |s: &Score| gain_at_start(data, &table.candidates[s.candidate], s);
     let mut out: Vec<(usize, Score)> = Vec::new();
     let mut ids: Vec<Id> = Vec::new();
     for score in all {
         let candidate = &table.candidates[score.candidate];
         let Some(id) = candidate.id else { continue };
+        if passed.contains(&id) {
+            continue;
+        }
         // An effect that would have to be turned round is not that effect.
         if candidate.free.is_empty() && !(score.coefficients[0] > 0.0) {
             continue;
@@ -136,106 +144,152 @@ pub fn effort(data: &Data) -> Effort {
     }
 }
 
-/// What a round found.
-pub struct Round {
-    /// Best first.
-    pub trials: Vec<Trial>,
-    /// How large each mechanism would have to be to be seen.
-    pub seen: Vec<Seen>,
-}
-
 /// Standard deviations from which an effect of one parameter is named in four cases of five.
 fn detectable() -> f64 {
     (2.0 * (LEAST_GAIN + PRICE_OF_PARAMETER + PRICE_OF_NAME)).sqrt() + POWER
 }
 
-/// One round: every finalist beside the model so far.
-pub fn round(
-    data: &Data,
-    so_far: &Judged,
-    free: &[Dependence],
-    excluded: &[Id],
-    chain_s: f64,
-) -> Round {
-    let effort = effort(data);
-    let slopes = Slopes::new(data, &so_far.model.base);
-    let taken = |id: Id| {
-        let entry = |t: &Term| data.catalogue.get(t.entry).id() == id;
-        excluded.contains(&id) || so_far.model.terms.iter().any(entry)
-    };
-    let found = evidence(data, &so_far.model);
-    let table = table(
-        data,
-        &so_far.model,
-        &slopes,
-        &found,
-        &so_far.extra,
-        free,
-        // What belongs to a balance that cannot be formed is not named for another.
-        &|id| !taken(id) && data.forms(id.balance()),
-    );
-    let mechanisms = table.candidates.len() - free.len();
-    let mut finalists: Vec<(usize, Vec<f64>, f64)> = Vec::new();
-    let mut sizes: Vec<(usize, f64)> = Vec::new();
-    let mut seen = Vec::new();
-    for (parts, count) in [
-        (capped(&so_far.parts), FINALISTS[0]),
-        (so_far.parts.clone(), FINALISTS[1]),
-    ] {
-        let sum = total(&table_grams(data, &parts, &table));
-        let Some(all) = scores(&table, &sum) else {
-            continue;
+/// All candidates beside the model so far, scored at the sensors' noise and at the fitted one.
+pub struct Screen<'a> {
+    data: &'a Data,
+    free: &'a [Dependence],
+    before: Before<'a>,
+    table: Table,
+    /// Of each level, with how many ids of it are judged.
+    levels: Vec<(Vec<Score>, usize)>,
+}
+
+impl<'a> Screen<'a> {
+    /// Scores all but the ids excluded; `chain_s` is what the chain's own timing was off by, in s.
+    pub fn new(
+        data: &'a Data,
+        so_far: &'a Judged,
+        free: &'a [Dependence],
+        excluded: &[Id],
+        chain_s: f64,
+    ) -> Self {
+        let slopes = Slopes::new(data, &so_far.model.base);
+        let taken = |id: Id| {
+            let entry = |t: &Term| data.catalogue.get(t.entry).id() == id;
+            excluded.contains(&id) || so_far.model.terms.iter().any(entry)
         };
-        if sizes.is_empty() {
-            seen = looked::seen(data, &table, &all, detectable());
-            sizes = all.iter().map(|s| (s.candidate, s.gain)).collect();
-        }
-        let size = |candidate: usize| {
-            let own = sizes.iter().find(|s| s.0 == candidate);
-            own.map_or(0.0, |s| s.1)
-        };
-        for (index, score) in best(data, &table, &all, count) {
-            let candidate = &table.candidates[index];
-            if !finalists
-                .iter()
-                .any(|f| table.candidates[f.0].entry == candidate.entry)
-            {
-                finalists.push((index, start_of(data, candidate, &score), size(index)));
-            }
-        }
-        // The best free dependence of either screen.
-        let free = all.iter().find(|s| s.candidate >= mechanisms);
-        if let Some(score) = free
-            && !finalists.iter().any(|f| f.0 == score.candidate)
-        {
-            finalists.push((score.candidate, Vec::new(), size(score.candidate)));
+        let found = evidence(data, &so_far.model);
+        let table = table(
+            data,
+            &so_far.model,
+            &slopes,
+            &found,
+            &so_far.extra,
+            free,
+            // What belongs to a balance that cannot be formed is not named for another.
+            &|id| !taken(id) && data.forms(id.balance()),
+        );
+        let before = Before::new(data, so_far, chain_s);
+        let levels = [
+            (before.noise_of_sensors(), FINALISTS[0]),
+            (so_far.parts.as_slice(), FINALISTS[1]),
+        ];
+        let levels = levels
+            .into_iter()
+            .filter_map(|(parts, count)| {
+                let sum = total(&table_grams(data, parts, &table));
+                Some((scores(&table, &sum)?, count))
+            })
+            .collect();
+        Self {
+            data,
+            free,
+            before,
+            table,
+            levels,
         }
     }
-    let before = Before::new(data, so_far, chain_s);
-    let mut trials: Vec<Trial> = finalists
-        .par_iter()
-        .filter_map(|(index, start, size)| {
-            let candidate = &table.candidates[*index];
-            let mut model = so_far.model.clone();
-            let mut extra = so_far.extra.clone();
-            let claim = match (candidate.id, candidate.entry) {
-                (Some(id), Some(entry)) => {
-                    model.terms.push(Term {
-                        entry,
-                        parameters: start.clone(),
-                    });
-                    Claim::Mechanism(id, entry)
-                }
-                _ => {
-                    let free = free[index - mechanisms].clone();
-                    extra.push(free.clone());
-                    Claim::Dependence(free)
-                }
-            };
-            let judged = judge(data, &model, &extra, Some(Guess::beside(so_far)), effort)?;
-            Some(before.tried(claim, judged, *size))
+
+    /// How large each mechanism would have to be to be seen.
+    pub fn seen(&self) -> Vec<Seen> {
+        self.levels.first().map_or_else(Vec::new, |(all, _)| {
+            looked::seen(self.data, &self.table, all, detectable())
         })
-        .collect();
-    rank(data, &mut trials);
-    Round { trials, seen }
+    }
+
+    /// Gain of a candidate at the first level that there is.
+    fn size(&self, candidate: usize) -> f64 {
+        let mut all = self.levels.iter().take(1).flat_map(|(all, _)| all);
+        let own = all.find(|s| s.candidate == candidate);
+        own.map_or(0.0, |s| s.gain)
+    }
+
+    /// Mechanisms that are judged, by candidate and start: the best but those passed over.
+    fn mechanisms(&self, passed: &[Id]) -> Vec<(usize, Vec<f64>)> {
+        let candidates = &self.table.candidates;
+        let mut out: Vec<(usize, Vec<f64>)> = Vec::new();
+        for (all, count) in &self.levels {
+            for (index, score) in best(self.data, &self.table, all, *count, passed) {
+                let candidate = &candidates[index];
+                if !out.iter().any(|f| candidates[f.0].entry == candidate.entry) {
+                    out.push((index, start_of(self.data, candidate, &score)));
+                }
+            }
+        }
+        out
+    }
+
+    /// The best free dependence of either level, by candidate.
+    fn dependences(&self) -> Vec<usize> {
+        let first = self.table.candidates.len() - self.free.len();
+        let mut out: Vec<usize> = Vec::new();
+        for (all, _) in &self.levels {
+            if let Some(score) = all.iter().find(|s| s.candidate >= first)
+                && !out.contains(&score.candidate)
+            {
+                out.push(score.candidate);
+            }
+        }
+        out
+    }
+
+    /// Every finalist at its own best, best first.
+    pub fn trials(&self) -> Vec<Trial> {
+        let mut finalists = self.mechanisms(&[]);
+        finalists.extend(self.dependences().into_iter().map(|c| (c, Vec::new())));
+        self.judged(&finalists)
+    }
+
+    /// The same of the mechanisms that are best where these are passed over.
+    pub fn trials_without(&self, passed: &[Id]) -> Vec<Trial> {
+        self.judged(&self.mechanisms(passed))
+    }
+
+    fn judged(&self, finalists: &[(usize, Vec<f64>)]) -> Vec<Trial> {
+        let data = self.data;
+        let so_far = self.before.judged;
+        let first_free = self.table.candidates.len() - self.free.len();
+        let mut trials: Vec<Trial> = finalists
+            .par_iter()
+            .filter_map(|(index, start)| {
+                let candidate = &self.table.candidates[*index];
+                let mut model = so_far.model.clone();
+                let mut extra = so_far.extra.clone();
+                let claim = match (candidate.id, candidate.entry) {
+                    (Some(id), Some(entry)) => {
+                        model.terms.push(Term {
+                            entry,
+                            parameters: start.clone(),
+                        });
+                        Claim::Mechanism(id, entry)
+                    }
+                    _ => {
+                        let free = self.free[index - first_free].clone();
+                        extra.push(free.clone());
+                        Claim::Dependence(free)
+                    }
+                };
+                let guess = Some(Guess::beside(so_far));
+                let judged = judge(data, &model, &extra, guess, effort(data))?;
+                Some(self.before.tried(claim, judged, self.size(*index)))
+            })
+            .collect();
+        rank(data, &mut trials);
+        trials
+    }
 }

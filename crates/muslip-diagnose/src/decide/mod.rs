@@ -4,7 +4,7 @@ mod finalists;
 mod rank;
 mod trial;
 
-use finalists::{Round, effort, round};
+use finalists::{Screen, effort};
 pub use rank::PREDICTED_APART;
 use rank::{ALIKE_NATS, rank};
 use trial::Before;
@@ -43,7 +43,7 @@ fn taken_up<'a>(data: &Data, trials: &'a [Trial]) -> Option<&'a Trial> {
         return standing().next();
     };
     let instead = |t: &&Trial| {
-        let of_same = t.balance(data) == named.balance(data);
+        let of_same = t.claim.balance(data) == named.claim.balance(data);
         of_same && t.weight() > DEPENDENCE_SHARE * named.weight() + DEPENDENCE_NATS
     };
     let mut free = standing().filter(|t| t.mechanism().is_none());
@@ -58,16 +58,13 @@ pub fn decide(data: &Data, mut base: Judged, excluded: &[Id], chain_s: f64) -> D
     let mut seen = None;
     let free = dependence::all(data);
     while chosen.model.terms.len() + chosen.extra.len() < MOST_NAMES {
-        let Round {
-            mut trials,
-            seen: found,
-        } = round(data, &chosen, &free, excluded, chain_s);
-        seen.get_or_insert(found);
+        let screen = Screen::new(data, &chosen, &free, excluded, chain_s);
+        seen.get_or_insert_with(|| screen.seen());
+        let mut trials = screen.trials();
         // What only the chain remembers has taken the place of other names.
         let of_chain = memories_of_chain(&trials);
         if !of_chain.is_empty() && taken_up(data, &trials).is_none() {
-            let others = [excluded, &of_chain].concat();
-            trials.extend(round(data, &chosen, &[], &others, chain_s).trials);
+            trials.extend(screen.trials_without(&of_chain));
             rank(data, &mut trials);
         }
         let mut next = taken_up(data, &trials).cloned();

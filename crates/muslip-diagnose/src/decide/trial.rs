@@ -48,6 +48,32 @@ pub enum Claim {
     Dependence(Dependence),
 }
 
+impl Claim {
+    /// The balance that it is of.
+    pub fn balance(&self, data: &Data) -> Balance {
+        match self {
+            Self::Mechanism(_, entry) => data.catalogue.get(*entry).id().balance(),
+            Self::Dependence(own) => own.balance,
+        }
+    }
+
+    /// What belongs to a run cannot be carried to another: its first half tells its second.
+    fn is_per_run(&self, data: &Data) -> bool {
+        match self {
+            Self::Mechanism(_, entry) => data.catalogue.get(*entry).form().contains("per_run"),
+            Self::Dependence(_) => false,
+        }
+    }
+
+    /// Whether it works through the force that is predicted.
+    fn works_through_force(&self) -> bool {
+        match self {
+            Self::Mechanism(id, _) => through_force(*id),
+            Self::Dependence(own) => own.balance == Balance::Tyre,
+        }
+    }
+}
+
 /// A claim as it stands against the model without it.
 #[derive(Clone)]
 pub struct Trial {
@@ -87,11 +113,6 @@ impl Trial {
         }
     }
 
-    /// The balance that its claim is of.
-    pub fn balance(&self, data: &Data) -> Balance {
-        balance_of(data, &self.claim)
-    }
-
     /// How much speaks for it at both levels of the noise: the geometric mean of its gains.
     #[must_use]
     pub fn weight(&self) -> f64 {
@@ -111,24 +132,9 @@ impl Trial {
         let own = gains(
             &base.unseen,
             &self.judged.unseen,
-            is_per_run(data, &self.claim),
+            self.claim.is_per_run(data),
         );
         self.unseen = mean_and_t(&own);
-    }
-}
-
-/// What belongs to a run cannot be carried to another: its first half tells its second.
-fn is_per_run(data: &Data, claim: &Claim) -> bool {
-    match claim {
-        Claim::Mechanism(_, entry) => data.catalogue.get(*entry).form().contains("per_run"),
-        Claim::Dependence(_) => false,
-    }
-}
-
-fn balance_of(data: &Data, claim: &Claim) -> Balance {
-    match claim {
-        Claim::Mechanism(_, entry) => data.catalogue.get(*entry).id().balance(),
-        Claim::Dependence(own) => own.balance,
     }
 }
 
@@ -169,7 +175,8 @@ fn sum_and_t(gains: &[f64]) -> (f64, f64) {
 /// The model so far, as what a trial adds to it is weighed against it.
 pub struct Before<'a> {
     data: &'a Data,
-    judged: &'a Judged,
+    /// It.
+    pub judged: &'a Judged,
     /// What the chain's own timing was off by, in s.
     chain_s: f64,
     /// Sum of squares of the drag that its best law leaves, by run.
@@ -191,21 +198,23 @@ impl<'a> Before<'a> {
         }
     }
 
+    /// The noise no larger than the sensors make plausible.
+    pub fn noise_of_sensors(&self) -> &[BalanceParts] {
+        &self.at_sensors.0
+    }
+
     pub fn tried(&self, claim: Claim, judged: Judged, size: f64) -> Trial {
         let (data, base) = (self.data, self.judged);
         let free = judged.free as f64 - base.free as f64;
-        let per_run = is_per_run(data, &claim);
+        let per_run = claim.is_per_run(data);
         let counts = judged.grams.iter().flatten().map(|g| g.count);
         let readings = counts.sum::<usize>() / judged.parts.len().max(1);
-        let balance = balance_of(data, &claim);
+        let balance = claim.balance(data);
         let first = !base.model.terms.iter().any(|t| {
             let id = data.catalogue.get(t.entry).id();
             id.balance() == balance && (balance != Balance::Tyre || through_force(id))
         });
-        let in_force = match &claim {
-            Claim::Mechanism(id, _) => through_force(*id),
-            Claim::Dependence(own) => own.balance == Balance::Tyre,
-        };
+        let in_force = claim.works_through_force();
         let predicts = if in_force {
             self.predicted_better(&judged)
         } else {
