@@ -51,4 +51,5 @@ pub mod repaired;
 mod separating;
 mod smooth;
 mod split;
+mod turn;
 mod variable;

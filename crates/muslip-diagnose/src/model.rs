@@ -62,6 +62,16 @@ impl Model {
         }
         model
     }
+
+    /// The same model without what goes by the order of the runs.
+    #[must_use]
+    pub fn without_order(&self, catalogue: &Catalogue, context: &Context) -> Self {
+        let mut model = self.clone();
+        model
+            .terms
+            .retain(|term| !catalogue.get(term.entry).by_order(context));
+        model
+    }
 }
 
 /// Slices of the parameter vector that belong to the terms.

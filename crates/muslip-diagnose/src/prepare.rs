@@ -9,6 +9,7 @@ use crate::campaign::{Rig, Run};
 use crate::cleaning::{clean, stretches};
 use crate::mechanism::{Balance, Context};
 use crate::smooth::{Smoothed, difference_sigma, median_in_place, smooth};
+use crate::turn;
 
 /// A step of so many typical ones is a gap, over which nothing is joined.
 pub(crate) const GAP_STEPS: f64 = 3.5;
@@ -92,6 +93,8 @@ pub struct Series {
     pub distance: Vec<f64>,
     /// Wheel angle since the first sample in rad.
     pub angle: Vec<f64>,
+    /// By exp(-c f^2) smoothing makes what has the angular frequency f smaller in the wheel speed: c in s^2.
+    pub wheel_smoothing: f64,
     /// Whether the sample stands still (slip undefined, no contact force).
     pub still: Vec<bool>,
     /// Whether the wheel rolls fast enough for slip to be defined.
@@ -509,6 +512,7 @@ pub fn prepare(
                 )
         })
         .collect();
+    let wheel_smoothing = turn::smoothing(&angle, &wheel.raw, &wheel.smooth, &rolling);
     let series = Series {
         name: run.name.clone(),
         time: time.clone(),
@@ -524,6 +528,7 @@ pub fn prepare(
         torque: torque.map(|(c, _)| c),
         distance,
         angle,
+        wheel_smoothing,
         still,
         rolling,
         tyre,

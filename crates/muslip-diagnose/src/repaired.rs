@@ -146,6 +146,10 @@ pub struct Repaired {
     pub base_alone: Vec<f64>,
     /// The same five in the repaired tyre model.
     pub base: Vec<f64>,
+    /// The same for a recording whose place among the campaign's is not known, where something goes by their order;
+    /// else empty.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub base_unplaced: Vec<f64>,
     /// Mechanisms of the tyre balance.
     #[serde(default)]
     pub tyre: Vec<RepairedTerm>,
@@ -362,6 +366,25 @@ impl Repaired {
         }
     }
 
+    /// The tyre model for one recording.
+    fn model_for(
+        &self,
+        catalogue: &Catalogue,
+        run: &Run,
+        which: Which,
+    ) -> Result<Model, RepairedError> {
+        let mut model = self.tyre_model(catalogue, which)?;
+        let unplaced = &self.base_unplaced;
+        if which == Which::Repaired && !unplaced.is_empty() && self.known(run).is_none() {
+            if unplaced.len() != model.base.len() || unplaced.iter().any(|v| !v.is_finite()) {
+                return Err(RepairedError::BadValue("base_unplaced".to_owned()));
+            }
+            model.base.clone_from(unplaced);
+            model = model.without_order(catalogue, &self.context);
+        }
+        Ok(model)
+    }
+
     /// The models of wheel and vehicle in the engine's own form.
     ///
     /// # Errors
@@ -419,7 +442,7 @@ impl Repaired {
         };
         blind.drag_force_n = Vec::new();
         let data = self.prepared(&blind);
-        let model = self.tyre_model(&data.catalogue, which)?;
+        let model = self.model_for(&data.catalogue, run, which)?;
         let series = &data.series[0];
         let state = tyre(
             &data.catalogue,

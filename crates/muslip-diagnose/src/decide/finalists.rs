@@ -1,5 +1,7 @@
 //! A round: candidates by their score, finalists at their own best.
 
+use std::collections::BTreeMap;
+
 use rayon::prelude::*;
 
 use super::rank::rank;
@@ -9,15 +11,16 @@ use crate::innovations::candidates::{Candidate, Table, table};
 use crate::innovations::dependence::Dependence;
 use crate::innovations::gram::total;
 use crate::innovations::hypothesis::{Effort, Guess, Judged, judge, noise_stride, table_grams};
-use crate::innovations::noise::Slopes;
+use crate::innovations::noise::{BalanceParts, Slopes};
 use crate::innovations::rows::rows_of;
 use crate::innovations::screen::{Score, scores};
 use crate::looked::{self, POWER, Seen};
 use crate::mechanism::{Evidence, Id};
 use crate::model::{Model, Term};
 
-/// Finalists that are judged in each round, from each of the two screens.
-const FINALISTS: [usize; 2] = [4, 1];
+/// Finalists that are judged in each round: best at the sensors' noise, and by the geometric mean of the gains at both
+/// levels, which is what trials are weighed by.
+const FINALISTS: [usize; 2] = [3, 4];
 
 fn evidence(data: &Data, model: &Model) -> Vec<Evidence> {
     data.series
@@ -91,9 +94,14 @@ fn best(
     passed: &[Id],
 ) -> Vec<(usize, Score)> {
     let at_start = |s: &Score| gain_at_start(data, &table.candidates[s.candidate], s);
+    let price = |s: &Score| {
+        PRICE_OF_PARAMETER * table.candidates[s.candidate].columns.len() as f64 + PRICE_OF_NAME
+    };
+    let mut best_first: Vec<&Score> = all.iter().collect();
+    best_first.sort_by(|a, b| (b.gain - price(b)).total_cmp(&(a.gain - price(a))));
     let mut out: Vec<(usize, Score)> = Vec::new();
     let mut ids: Vec<Id> = Vec::new();
-    for score in all {
+    for score in best_first {
         let candidate = &table.candidates[score.candidate];
         let Some(id) = candidate.id else { continue };
         if passed.contains(&id) {
@@ -103,8 +111,7 @@ fn best(
         if candidate.free.is_empty() && !(score.coefficients[0] > 0.0) {
             continue;
         }
-        let price = PRICE_OF_PARAMETER * candidate.columns.len() as f64;
-        if !(score.gain > price) {
+        if !(score.gain > price(score)) {
             continue;
         }
         if out
@@ -149,13 +156,30 @@ fn detectable() -> f64 {
     (2.0 * (LEAST_GAIN + PRICE_OF_PARAMETER + PRICE_OF_NAME)).sqrt() + POWER
 }
 
+/// Scores at one level with the geometric mean of the gains at both, best first.
+fn at_both(one: &[Score], other: &[Score]) -> Vec<Score> {
+    let gains: BTreeMap<usize, f64> = other.iter().map(|s| (s.candidate, s.gain)).collect();
+    let mut all: Vec<Score> = one
+        .iter()
+        .filter_map(|score| {
+            let other = gains.get(&score.candidate)?;
+            Some(Score {
+                gain: (score.gain.max(0.0) * other.max(0.0)).sqrt(),
+                ..score.clone()
+            })
+        })
+        .collect();
+    all.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+    all
+}
+
 /// All candidates beside the model so far, scored at the sensors' noise and at the fitted one.
 pub struct Screen<'a> {
     data: &'a Data,
     free: &'a [Dependence],
     before: Before<'a>,
     table: Table,
-    /// Of each level, with how many ids of it are judged.
+    /// At the sensors' noise, and as trials are weighed; with how many ids of each are judged.
     levels: Vec<(Vec<Score>, usize)>,
 }
 
@@ -185,17 +209,16 @@ impl<'a> Screen<'a> {
             &|id| !taken(id) && data.forms(id.balance()),
         );
         let before = Before::new(data, so_far, chain_s);
-        let levels = [
-            (before.noise_of_sensors(), FINALISTS[0]),
-            (so_far.parts.as_slice(), FINALISTS[1]),
-        ];
-        let levels = levels
-            .into_iter()
-            .filter_map(|(parts, count)| {
-                let sum = total(&table_grams(data, parts, &table));
-                Some((scores(&table, &sum)?, count))
-            })
-            .collect();
+        let at = |parts: &[BalanceParts]| scores(&table, &total(&table_grams(data, parts, &table)));
+        let levels: Vec<(Vec<Score>, usize)> =
+            match (at(before.noise_of_sensors()), at(&so_far.parts)) {
+                (Some(sensors), Some(fitted)) => {
+                    let both = at_both(&sensors, &fitted);
+                    vec![(sensors, FINALISTS[0]), (both, FINALISTS[1])]
+                }
+                (Some(one), None) | (None, Some(one)) => vec![(one, FINALISTS[0])],
+                (None, None) => Vec::new(),
+            };
         Self {
             data,
             free,

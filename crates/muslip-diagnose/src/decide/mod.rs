@@ -5,8 +5,8 @@ mod rank;
 mod trial;
 
 use finalists::{Screen, effort};
-pub use rank::PREDICTED_APART;
 use rank::{ALIKE_NATS, rank};
+pub use rank::{PREDICTED_APART, softness};
 use trial::Before;
 pub use trial::{Claim, Trial, stands, through_force};
 
@@ -20,6 +20,8 @@ use crate::model::Model;
 /// A free dependence is said instead of a mechanism where it gains so many times as much, and so many nats more.
 const DEPENDENCE_SHARE: f64 = 1.33;
 const DEPENDENCE_NATS: f64 = 15.0;
+/// Share of a name's weight below which its alias, weighed beside it, is what its own form leaves.
+const FORM_LEFT: f64 = 0.1;
 /// Most names.
 const MOST_NAMES: usize = 3;
 
@@ -35,10 +37,34 @@ pub struct Decision {
     pub seen: Vec<Seen>,
 }
 
+/// A name that was taken up, and how much spoke for it.
+type Named = (Id, f64);
+
+/// Whether a trial is of an alias of what was named, and so small beside it that it is what that name's form leaves.
+fn left_by_form(data: &Data, trial: &Trial, named: &[Named]) -> bool {
+    let Some((id, entry)) = trial.mechanism() else {
+        return false;
+    };
+    let aliases_of = |id: Id| {
+        let entries = data
+            .catalogue
+            .entries()
+            .iter()
+            .filter(move |m| m.id() == id);
+        entries.flat_map(|m| m.guide().aliases.iter().map(|a| a.with))
+    };
+    let own = data.catalogue.get(entry).guide().aliases;
+    named.iter().any(|&(other, weight)| {
+        let alias = own.iter().any(|a| a.with == other) || aliases_of(other).any(|with| with == id);
+        alias && trial.weight() < FORM_LEFT * weight
+    })
+}
+
 /// The trial that is taken up: a mechanism, unless a free dependence accounts for much more in the same balance. One
 /// in another balance is no other account of it, and has its turn later.
-fn taken_up<'a>(data: &Data, trials: &'a [Trial]) -> Option<&'a Trial> {
-    let standing = || trials.iter().filter(|t| stands(t));
+fn taken_up<'a>(data: &Data, trials: &'a [Trial], named: &[Named]) -> Option<&'a Trial> {
+    let own = |t: &&Trial| stands(t) && !left_by_form(data, t, named);
+    let standing = || trials.iter().filter(own);
     let Some(named) = standing().find(|t| t.mechanism().is_some()) else {
         return standing().next();
     };
@@ -56,18 +82,23 @@ pub fn decide(data: &Data, mut base: Judged, excluded: &[Id], chain_s: f64) -> D
     let mut chosen = base.clone();
     let mut rounds = Vec::new();
     let mut seen = None;
+    let mut named: Vec<Named> = Vec::new();
     let free = dependence::all(data);
     while chosen.model.terms.len() + chosen.extra.len() < MOST_NAMES {
         let screen = Screen::new(data, &chosen, &free, excluded, chain_s);
         seen.get_or_insert_with(|| screen.seen());
         let mut trials = screen.trials();
         // What only the chain remembers has taken the place of other names.
-        let of_chain = memories_of_chain(&trials);
-        if !of_chain.is_empty() && taken_up(data, &trials).is_none() {
-            trials.extend(screen.trials_without(&of_chain));
+        let of_chain = trials.iter().any(|t| !t.outlasts_chain);
+        if of_chain && taken_up(data, &trials, &named).is_none() {
+            let tried: Vec<Id> = trials
+                .iter()
+                .filter_map(|t| Some(t.mechanism()?.0))
+                .collect();
+            trials.extend(screen.trials_without(&tried));
             rank(data, &mut trials);
         }
-        let mut next = taken_up(data, &trials).cloned();
+        let mut next = taken_up(data, &trials, &named).cloned();
         if let Some(better) = next.as_ref().and_then(|t| at_noise_of(data, &chosen, t)) {
             for trial in &mut trials {
                 trial.set_against(data, &chosen, &better);
@@ -77,11 +108,14 @@ pub fn decide(data: &Data, mut base: Judged, excluded: &[Id], chain_s: f64) -> D
                 base = better.clone();
             }
             chosen = better;
-            next = taken_up(data, &trials).cloned();
+            next = taken_up(data, &trials, &named).cloned();
         }
         rounds.push(trials);
         match next {
-            Some(trial) => chosen = trial.judged,
+            Some(trial) => {
+                named.extend(trial.mechanism().map(|(id, _)| (id, trial.weight())));
+                chosen = trial.judged;
+            }
             None => break,
         }
     }
@@ -94,12 +128,6 @@ pub fn decide(data: &Data, mut base: Judged, excluded: &[Id], chain_s: f64) -> D
         rounds,
         seen: seen.unwrap_or_default(),
     }
-}
-
-/// Mechanisms whose memory is no longer than the chain's.
-fn memories_of_chain(trials: &[Trial]) -> Vec<Id> {
-    let of_chain = trials.iter().filter(|t| !t.outlasts_chain);
-    of_chain.filter_map(|t| Some(t.mechanism()?.0)).collect()
 }
 
 /// The model so far under noise like a trial's, where that is better: sizes of the noise that only the trial came

@@ -5,6 +5,9 @@ use crate::data::Data;
 
 /// Gains in nats that differ by less are alike.
 pub const ALIKE_NATS: f64 = 0.5;
+/// Softness of the choice between two names in nats, and as a share of what the better one gains.
+const SOFTNESS: f64 = 4.0;
+const SOFT_SHARE: f64 = 0.03;
 /// Of names that gain alike, to this share, the one comes first that predicts the drag better by this logarithm.
 const ALIKE_SHARE: f64 = 0.7;
 pub const PREDICTED_APART: f64 = 0.1;
@@ -15,6 +18,22 @@ pub fn rank(data: &Data, trials: &mut [Trial]) {
     trials.sort_by(|a, b| order(a, b).then(b.gain.total_cmp(&a.gain)));
     least_claims_first(trials, Trial::weight, |t| balances(data, t));
     better_predicted_first(trials, Trial::weight, |t| t.predicts);
+    commoner_first(trials, Trial::weight, |t| {
+        let mechanism = t.mechanism();
+        mechanism.is_some_and(|(_, entry)| data.catalogue.get(entry).rare())
+    });
+}
+
+/// Of neighbours that the recordings hardly tell apart, what is common first.
+fn commoner_first<T>(best_first: &mut [T], gain: impl Fn(&T) -> f64, rare: impl Fn(&T) -> bool) {
+    sort_neighbours(best_first, |own, other| {
+        !rare(own) && rare(other) && gain(other) - gain(own) < softness(gain(other))
+    });
+}
+
+/// Nats by which two names may differ and be hardly told apart: no model of this kind is exactly true.
+pub fn softness(gain: f64) -> f64 {
+    SOFTNESS + SOFT_SHARE * gain
 }
 
 /// Of those that gain much the same and work through the force, the one first that predicts the drag clearly better.
@@ -79,6 +98,15 @@ mod tests {
         better_predicted_first(&mut all, |t| t.0, |t| t.1);
         let gains = all.map(|t| t.0);
         assert_eq!(gains, [330.0, 310.0, 400.0, 100.0, 90.0]);
+    }
+
+    #[test]
+    fn of_two_that_are_hardly_told_apart_the_common_one_comes_first() {
+        // Gain and whether it is rare: within 4 nats and 3 % of the better one.
+        let mut all = [(402.0, true), (396.0, false), (384.0, true), (300.0, false)];
+        commoner_first(&mut all, |t| t.0, |t| t.1);
+        let gains = all.map(|t| t.0);
+        assert_eq!(gains, [396.0, 402.0, 384.0, 300.0]);
     }
 
     #[test]

@@ -34,6 +34,9 @@ const DEPENDENCE_WORTH: f64 = 3.0;
 /// Logarithm by which a memory that the chain might have lowers the mean square error of the drag, and the least t of its
 /// gains, where it is real: kernels that differ lower none.
 const REAL_MEMORY: (f64, f64) = (0.25, 2.5);
+/// Damping ratio below which a response rings longer than any filter of a chain: the least damped pole of a fourth-order
+/// Butterworth filter has 0.38.
+const RINGING: f64 = 0.12;
 /// Least memory in s that is told from a chain without any error of timing.
 const LEAST_MEMORY_S: f64 = 2.5e-3;
 /// Least logarithm by which a name that works through the force lowers the mean square error of the drag.
@@ -306,7 +309,13 @@ fn memory_s(data: &Data, id: Id, entry: usize, model: &Model) -> Option<f64> {
     match id {
         Id::BrakeLag | Id::ForceLag | Id::ForceDelay => Some(first),
         Id::RelaxationLength => Some(first / data.context.mean_speed),
-        Id::StructuralResonance => Some(1.0 / (core::f64::consts::TAU * first)),
+        Id::StructuralResonance => {
+            let omega = core::f64::consts::TAU * first;
+            let damping = term.parameters.get(1).copied().unwrap_or(1.0);
+            // What rings remembers as long as it rings.
+            let rings = damping < RINGING;
+            Some(1.0 / (omega * if rings { damping } else { 1.0 }))
+        }
         _ => None,
     }
 }

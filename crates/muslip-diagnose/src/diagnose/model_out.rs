@@ -13,7 +13,9 @@ use crate::prepare::Series;
 use crate::repaired::{Domain, KnownRecording, NoiseModel, Repaired, RepairedTerm, Which};
 
 /// Least mean logarithm by which a repaired model lowers the square of a prediction's error: less is chance.
-const LEAST_GAIN_OF_PREDICTION: f64 = 0.01;
+const LEAST_GAIN_OF_PREDICTION: f64 = 0.02;
+/// Factor on the square of a recording's error that is still no worse.
+const MOST_WORSE: f64 = 1.002;
 
 /// Terms of a model with the covariance of all its parameters.
 struct Terms {
@@ -25,7 +27,9 @@ impl Answer<'_> {
     /// The model with what was named, its channels at one time where they are named late.
     pub(super) fn repaired(&self) -> Repaired {
         let data = &self.data;
-        let covariance = self.covariance(&self.decision.chosen);
+        let chosen = &self.decision.chosen;
+        let unplaced = chosen.model.without_order(&data.catalogue, &data.context);
+        let covariance = self.covariance(chosen);
         let [tyre, dynamics] = [true, false].map(|tyre| self.terms(tyre, &covariance));
         let late = if self.named_delays().is_empty() {
             Lateness::default()
@@ -38,10 +42,15 @@ impl Answer<'_> {
             rig: data.rig.clone(),
             late,
             base_alone: self.given.plain_law(self.kept),
-            base: self.predicting_base(),
+            base: self.predicting_base(&chosen.model),
+            base_unplaced: if unplaced.terms.len() < chosen.model.terms.len() {
+                self.predicting_base(&unplaced)
+            } else {
+                Vec::new()
+            },
             tyre: tyre.terms,
             dynamics: dynamics.terms,
-            corrections: self.decision.chosen.corrections(data),
+            corrections: chosen.corrections(data),
             covariance: tyre.covariance,
             dynamics_covariance: dynamics.covariance,
             noise: NoiseModel {
@@ -135,14 +144,14 @@ impl Answer<'_> {
     }
 
     /// Whether the repaired model predicts the drag of the recordings better than the law fitted to raw channels: on
-    /// the whole, and worse on few of them.
+    /// the whole, and worse on none of them.
     pub(super) fn predicts_better(&self, base: &Repaired, with: &Repaired) -> bool {
         let chosen = &self.decision.chosen.model;
         let per_run = chosen.terms.iter().any(|t| {
             let entry = self.data.catalogue.get(t.entry);
             entry.form().contains("per_run")
         });
-        let (mut gained, mut worse) = (0.0, 0);
+        let mut gained = 0.0;
         for (place, given) in self.given.runs.iter().enumerate() {
             let mut given = given.clone();
             if per_run {
@@ -154,19 +163,18 @@ impl Answer<'_> {
                 return false;
             };
             gained += (a / b).ln();
-            if b > 1.002 * a {
-                worse += 1;
+            if b > MOST_WORSE * a {
+                return false;
             }
         }
         gained > LEAST_GAIN_OF_PREDICTION * self.given.runs.len() as f64
-            && worse * 4 <= self.given.runs.len()
     }
 
-    /// The law's two parameters that predict best beside the named terms and the corrections: by plain least squares,
-    /// for a prediction has noisy inputs, too.
-    fn predicting_base(&self) -> Vec<f64> {
-        let (data, chosen) = (&self.data, &self.decision.chosen);
-        closest(data, &chosen.model, &chosen.drag_to_explain(data)).base
+    /// The law's two parameters that predict best beside the terms of a model and the corrections: by plain least
+    /// squares, for a prediction has noisy inputs, too.
+    fn predicting_base(&self, model: &Model) -> Vec<f64> {
+        let drags = self.decision.chosen.drag_to_explain(&self.data);
+        closest(&self.data, model, &drags).base
     }
 }
 

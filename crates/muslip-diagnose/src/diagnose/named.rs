@@ -4,22 +4,20 @@ use std::collections::BTreeMap;
 
 use super::Answer;
 use crate::audit::Timing;
-use crate::decide::{Claim, PREDICTED_APART, Trial, stands};
+use crate::decide::{Claim, PREDICTED_APART, Trial, softness, stands};
 use crate::figures::figures;
 use crate::mechanism::{Id, Reported};
 use crate::number::finite_or_zero;
 use crate::outcome::{Alternative, Evidence, Figure, NamedMechanism, Unexplained, sentence};
 use crate::separating::separating_test;
 
-/// Softness of the choice between two names in nats: no model of this kind is exactly true.
-const SOFTNESS: f64 = 4.0;
-/// The same as a share of what the chosen name gains.
-const SOFT_SHARE: f64 = 0.03;
 /// A delay is named where it is so many standard deviations and so many seconds from none.
 const SURE_DELAY: f64 = 5.0;
 const LEAST_DELAY_S: f64 = 1.5e-3;
 /// Largest standard deviation in s of a delay that is named.
 pub(super) const VAGUE_DELAY_S: f64 = 4e-3;
+/// Standard deviations by which the audit, too, has to find a delay.
+const AUDITED: f64 = 2.0;
 /// Delays that the timing names: no round weighs them.
 pub(super) const DELAYS: [Id; 2] = [Id::WheelSpeedDelay, Id::VehicleSpeedDelay];
 
@@ -128,7 +126,11 @@ impl Answer<'_> {
             .filter_map(|&id| {
                 let late = self.delay_of(id)?;
                 let sure = late.std < VAGUE_DELAY_S && late.value > least_delay(&late);
-                sure.then(|| self.delay(id, late.value, late.std))?
+                // Fitted with a law that may be wrong it is believed where the audit, which has none, says so too.
+                let told = self
+                    .audited(id)
+                    .is_some_and(|own| own.value > AUDITED * own.std);
+                (sure && told).then(|| self.delay(id, late.value, late.std))?
             })
             .collect()
     }
@@ -138,6 +140,15 @@ impl Answer<'_> {
         match id {
             Id::WheelSpeedDelay => Some(self.timing.against_drag(self.timing.wheel)),
             Id::VehicleSpeedDelay => Some(self.timing.against_drag(self.timing.vehicle)),
+            _ => None,
+        }
+    }
+
+    /// What the audit says of it.
+    fn audited(&self, id: Id) -> Option<Timing> {
+        match id {
+            Id::WheelSpeedDelay => Some(self.audit.wheel_late),
+            Id::VehicleSpeedDelay => Some(self.audit.vehicle_late),
             _ => None,
         }
     }
@@ -178,7 +189,7 @@ fn surest(runs: usize) -> f64 {
 
 /// How sure a name is: against the other finalists of its round, against none, and by what so many runs can show.
 fn confidence(trial: &Trial, round: &[Trial], runs: usize) -> (f64, Vec<Alternative>) {
-    let softness = SOFTNESS + SOFT_SHARE * trial.weight();
+    let softness = softness(trial.weight());
     // What predicts the drag worse is less likely however much it gains, for the chain's nuisances may do its work.
     let worse = |t: &Trial| {
         let by = trial.predicts - t.predicts;

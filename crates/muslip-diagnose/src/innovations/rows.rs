@@ -120,7 +120,8 @@ pub fn rows<T: Listed>(
                 },
                 &|k| {
                     // What the reading is off by, an encoder's ripple, is off in the level as well.
-                    let off = state.omega[k] - series.wheel.smooth[k];
+                    let beyond = state.read_off.as_ref().map_or(zero, |off| off[k]);
+                    let off = state.omega[k] - series.wheel.smooth[k] + beyond;
                     let off = if off.value().is_finite() { off } else { zero };
                     wheel.inertia_change * (context.inertia * series.wheel.slow[k])
                         + (off + series.wheel.raw[k]) * context.inertia

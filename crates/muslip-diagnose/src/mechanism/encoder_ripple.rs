@@ -70,62 +70,25 @@ impl Describe for EncoderRipple {
     }
 }
 
-/// Smallest share that is believed: below it the line in the reading is all noise.
-const LEAST_SHARE: f64 = 0.25;
-
-/// Share of what repeats once a turn that smoothing has left in the wheel speed. The models run on the smoothed speed,
-/// so that share of the ripple is all that they see of it.
-fn share_left(series: &[Series]) -> f64 {
-    let (mut product, mut power) = (0.0, 0.0);
-    for run in series {
-        let trend = mean_of_a_turn(&run.angle, &run.wheel.raw);
-        let line = |values: &[f64]| {
-            let (mut cosine, mut sine) = (0.0, 0.0);
-            for k in (0..run.len()).filter(|k| run.rolling[*k]) {
-                let (s, c) = run.angle[k].sin_cos();
-                cosine += c * (values[k] - trend[k]);
-                sine += s * (values[k] - trend[k]);
-            }
-            (cosine, sine)
-        };
-        let (raw, smooth) = (line(&run.wheel.raw), line(&run.wheel.smooth));
-        product += raw.0 * smooth.0 + raw.1 * smooth.1;
-        power += raw.0 * raw.0 + raw.1 * raw.1;
-    }
-    let share = product / power;
-    if share.is_finite() {
-        share.clamp(LEAST_SHARE, 1.0)
-    } else {
-        1.0
-    }
-}
-
-/// Centred mean over one turn of the wheel: what repeats once a turn is not in it.
-fn mean_of_a_turn(angle: &[f64], values: &[f64]) -> Vec<f64> {
-    let mut sum = 0.0;
-    let (mut from, mut to) = (0, 0);
-    angle
-        .iter()
-        .map(|centre| {
-            while to < values.len() && angle[to] <= centre + core::f64::consts::PI {
-                sum += values[to];
-                to += 1;
-            }
-            while angle[from] < centre - core::f64::consts::PI {
-                sum -= values[from];
-                from += 1;
-            }
-            sum / (to - from).max(1) as f64
-        })
-        .collect()
-}
-
 impl<T: Number> Mechanism<T> for EncoderRipple {
     fn apply(&self, p: &[T], series: &Series, _context: &Context, state: &mut State<T>) {
-        if let Some(ripple) = self.form.ripple(p, series) {
-            for (omega, r) in state.omega.iter_mut().zip(ripple) {
-                *omega = *omega / (r + 1.0);
+        let left = |order: usize, k: usize| {
+            let frequency = order as f64 * series.wheel.smooth[k];
+            (-series.wheel_smoothing * frequency * frequency).exp()
+        };
+        if let (Some(read), Some(smooth)) = (
+            self.form.ripple(p, series, &|_, _| 1.0),
+            self.form.ripple(p, series, &left),
+        ) {
+            // Slip is formed of the smoothed speed, the wheel's balance of the speed as read.
+            let mut off = Vec::with_capacity(read.len());
+            for (omega, (read, smooth)) in state.omega.iter_mut().zip(read.into_iter().zip(smooth))
+            {
+                let turning = *omega / (smooth + 1.0);
+                off.push(turning * (smooth - read));
+                *omega = turning;
             }
+            state.read_off = Some(off);
         }
     }
     fn report(
@@ -133,24 +96,8 @@ impl<T: Number> Mechanism<T> for EncoderRipple {
         p: &[T],
         _law: &Law<T>,
         _context: &Context,
-        series: &[Series],
+        _series: &[Series],
     ) -> Vec<Reported<T>> {
-        self.form.report(p, 1.0 / share_left(series))
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_mean_of_a_turn_holds_the_trend_and_not_the_ripple() {
-        let angle: Vec<f64> = (0..2000).map(|k| 0.05 * f64::from(k)).collect();
-        let values: Vec<f64> = angle.iter().map(|a| 10.0 + 0.01 * a + a.sin()).collect();
-        let trend = mean_of_a_turn(&angle, &values);
-        for k in 100..1900 {
-            let expected = 10.0 + 0.01 * angle[k];
-            assert!((trend[k] - expected).abs() < 0.01, "{k}: {}", trend[k]);
-        }
+        self.form.report(p, 1.0)
     }
 }

@@ -7,23 +7,53 @@ use super::{
 use crate::number::Number;
 use crate::prepare::Series;
 
+/// How the drag channel comes to its limit.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Form {
+    /// At once.
+    Hard,
+    /// By and by: an amplifier that compresses before it clips.
+    Soft,
+}
+
+/// All forms.
+pub const FORMS: [Form; 2] = [Form::Hard, Form::Soft];
+
+/// Sharpness of a soft limit: of two, the reading of a force as large as the limit is short by 29 %; of thirty it is
+/// as good as hard.
+const SHARPNESS: [f64; 2] = [2.0, 30.0];
+
 /// The drag channel clips.
-pub struct ForceSaturation;
+pub struct ForceSaturation {
+    /// Which form.
+    pub form: Form,
+}
 
 impl Describe for ForceSaturation {
     fn id(&self) -> Id {
         Id::ForceSaturation
     }
+    fn form(&self) -> &'static str {
+        match self.form {
+            Form::Hard => "",
+            Form::Soft => "soft",
+        }
+    }
     fn stage(&self) -> Stage {
         Stage::Chain
     }
     fn parameters(&self, context: &Context) -> Vec<Parameter> {
-        vec![Parameter::new(
+        let limit = Parameter::new(
             "limit",
             "N",
             0.02 * context.max_drag,
             1.5 * context.max_drag,
-        )]
+        );
+        let [low, high] = SHARPNESS;
+        match self.form {
+            Form::Hard => vec![limit],
+            Form::Soft => vec![limit, Parameter::new("sharpness", "1", low, high)],
+        }
     }
     fn starts(
         &self,
@@ -31,16 +61,26 @@ impl Describe for ForceSaturation {
         _series: &[Series],
         _evidence: &[Evidence],
     ) -> Vec<Vec<f64>> {
-        [0.995, 0.97, 0.93, 0.88, 0.8, 0.7]
-            .iter()
-            .map(|m| vec![m * (context.max_drag - 1.5 * context.drag_sigma)])
-            .collect()
+        let largest = context.max_drag - 1.5 * context.drag_sigma;
+        match self.form {
+            Form::Hard => [0.995, 0.97, 0.93, 0.88, 0.8, 0.7]
+                .iter()
+                .map(|m| vec![m * largest])
+                .collect(),
+            Form::Soft => [0.9, 1.05, 1.25]
+                .iter()
+                .map(|m| vec![m * largest, 8.0])
+                .collect(),
+        }
     }
     fn amplitude(&self) -> Option<usize> {
         None
     }
     fn equation(&self) -> &'static str {
-        "reading = min(drag, limit)"
+        match self.form {
+            Form::Hard => "reading = min(drag, limit)",
+            Form::Soft => "reading = drag / (1 + (drag / limit)^sharpness)^(1 / sharpness)",
+        }
     }
     fn statement(&self, reported: &[Reported<f64>], _p: &[f64]) -> String {
         format!("the drag channel clips at {:.0} N", reported[0].value)
@@ -68,9 +108,11 @@ impl Describe for ForceSaturation {
 impl<T: Number> Mechanism<T> for ForceSaturation {
     fn apply(&self, p: &[T], _series: &Series, _context: &Context, state: &mut State<T>) {
         for y in &mut state.force {
-            if y.value() > p[0].value() {
-                *y = p[0];
-            }
+            *y = match self.form {
+                Form::Hard if y.value() > p[0].value() => p[0],
+                Form::Soft if y.value() > 0.0 => compressed(*y, p[0], p[1]),
+                Form::Hard | Form::Soft => *y,
+            };
         }
     }
     fn report(
@@ -85,5 +127,37 @@ impl<T: Number> Mechanism<T> for ForceSaturation {
             unit: "N",
             value: p[0],
         }]
+    }
+}
+
+/// Reading of a force above zero through a soft limit; the smaller of the two is raised to the power, so that nothing
+/// overflows.
+fn compressed<T: Number>(force: T, limit: T, sharpness: T) -> T {
+    let ratio = (force / limit).ln();
+    let (smaller, power) = if ratio.value() < 0.0 {
+        (force, ratio * sharpness)
+    } else {
+        (limit, -(ratio * sharpness))
+    };
+    smaller * (-((power.exp() + 1.0).ln() / sharpness)).exp()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_soft_limit_follows_its_equation_and_is_passed_by_no_force() {
+        for (force, limit, sharpness) in
+            [(50.0, 100.0, 4.0), (100.0, 100.0, 2.0), (900.0, 100.0, 8.0)]
+        {
+            let found: f64 = compressed(force, limit, sharpness);
+            let expected = force / (1.0 + (force / limit).powf(sharpness)).powf(1.0 / sharpness);
+            assert!(
+                (found - expected).abs() < 1e-9 * expected,
+                "{found} {expected}"
+            );
+        }
+        assert!(compressed(1e9, 100.0, 30.0) <= 100.0);
     }
 }

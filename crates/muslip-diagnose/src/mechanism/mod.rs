@@ -255,6 +255,8 @@ fn rational<T: Number>(x: T, log_b: T) -> T {
 pub struct State<T> {
     /// Wheel speed in rad/s.
     pub omega: Vec<T>,
+    /// By what the wheel speed as read is off beyond the smoothed one, in rad/s, where it is.
+    pub read_off: Option<Vec<T>>,
     /// Vehicle speed in m/s.
     pub speed: Vec<T>,
     /// Normal force in N.
@@ -294,6 +296,7 @@ impl<T: Number> State<T> {
         let zero = T::constant(0.0);
         Self {
             omega: Vec::new(),
+            read_off: None,
             speed: Vec::new(),
             load: Vec::new(),
             radius: None,
@@ -359,6 +362,15 @@ pub trait Describe: Send + Sync {
     fn amplitude(&self) -> Option<usize> {
         Some(0)
     }
+    /// Whether it is rare beside what recordings hardly tell it from.
+    fn rare(&self) -> bool {
+        false
+    }
+    /// Whether it goes by the order of the campaign's runs: a recording whose place in it is not known is predicted
+    /// without it.
+    fn by_order(&self, _context: &Context) -> bool {
+        false
+    }
     /// Whether the figures of this form can be carried over to a run it was not fitted to.
     fn predicts(&self) -> bool {
         true
@@ -387,8 +399,6 @@ pub fn catalogue<T: Number>() -> Vec<Box<dyn Mechanism<T>>> {
         Box::new(inertial_reaction::InertialReaction),
         Box::new(force_delay::ForceDelay),
         Box::new(force_lag::ForceLag),
-        Box::new(structural_resonance::StructuralResonance),
-        Box::new(force_saturation::ForceSaturation),
         Box::new(load_sensitivity::LoadSensitivity {
             with_stiffness: false,
         }),
@@ -408,6 +418,12 @@ pub fn catalogue<T: Number>() -> Vec<Box<dyn Mechanism<T>>> {
         Box::new(brake_lag::BrakeLag),
         Box::new(wheel_inertia::WheelInertia),
     ];
+    for form in structural_resonance::FORMS {
+        all.push(Box::new(structural_resonance::StructuralResonance { form }));
+    }
+    for form in force_saturation::FORMS {
+        all.push(Box::new(force_saturation::ForceSaturation { form }));
+    }
     for form in curve_shape::FORMS {
         all.push(Box::new(curve_shape::CurveShape { form }));
     }
@@ -430,7 +446,12 @@ pub fn catalogue<T: Number>() -> Vec<Box<dyn Mechanism<T>>> {
         all.push(Box::new(zero_drift::ZeroDrift { form }));
     }
     for form in once_a_turn::FORMS {
-        all.push(Box::new(run_out::RunOut { form }));
+        let of = run_out::Of::Drag;
+        all.push(Box::new(run_out::RunOut { form, of }));
+        if form.orders == 1 {
+            let of = run_out::Of::Radius;
+            all.push(Box::new(run_out::RunOut { form, of }));
+        }
     }
     for form in once_a_turn::FORMS {
         all.push(Box::new(encoder_ripple::EncoderRipple { form }));

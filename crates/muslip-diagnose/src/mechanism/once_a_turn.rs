@@ -77,8 +77,14 @@ impl Form {
         vec![vec![0.0; self.width() * self.phases(context)]]
     }
 
-    /// The relative ripple at every sample of a run; `None` for a run whose phase is not known.
-    pub fn ripple<T: Number>(self, p: &[T], series: &Series) -> Option<Vec<T>> {
+    /// The relative ripple at every sample of a run, each order times what is left of it there; `None` for a run whose
+    /// phase is not known.
+    pub fn ripple<T: Number>(
+        self,
+        p: &[T],
+        series: &Series,
+        left: &dyn Fn(usize, usize) -> f64,
+    ) -> Option<Vec<T>> {
         let from = if self.phase_per_run {
             self.width() * series.index
         } else {
@@ -89,11 +95,12 @@ impl Form {
             series
                 .angle
                 .iter()
-                .map(|angle| {
+                .enumerate()
+                .map(|(k, angle)| {
                     let mut ripple = T::constant(0.0);
-                    for (order, part) in own.chunks_exact(2).enumerate() {
-                        let (sin, cos) = ((order + 1) as f64 * angle).sin_cos();
-                        ripple += part[0] * cos + part[1] * sin;
+                    for (part, order) in own.chunks_exact(2).zip(1..) {
+                        let (sin, cos) = (order as f64 * angle).sin_cos();
+                        ripple += (part[0] * cos + part[1] * sin) * left(order, k);
                     }
                     ripple
                 })

@@ -10,11 +10,24 @@ use crate::prepare::Series;
 
 /// Largest amplitude of an order, as a share of the drag.
 const LIMIT: f64 = 0.5;
+/// The same as a share of the radius.
+const LIMIT_OF_RADIUS: f64 = 0.08;
+
+/// What varies with the wheel's angle.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Of {
+    /// The drag, in proportion to itself: a load that varies, a tyre unequally stiff.
+    Drag,
+    /// The rolling radius, hence the slip.
+    Radius,
+}
 
 /// Drag varies once (or a few times) a wheel revolution.
 pub struct RunOut {
-    /// Which form.
+    /// Orders and phases.
     pub form: Form,
+    /// Of what.
+    pub of: Of,
 }
 
 impl Describe for RunOut {
@@ -22,37 +35,63 @@ impl Describe for RunOut {
         Id::RunOut
     }
     fn form(&self) -> &'static str {
-        self.form.as_str()
+        match (self.of, self.form.phase_per_run) {
+            (Of::Drag, _) => self.form.as_str(),
+            (Of::Radius, false) => "radius",
+            (Of::Radius, true) => "radius_phase_per_run",
+        }
     }
     fn stage(&self) -> Stage {
-        Stage::Contact
+        match self.of {
+            Of::Drag => Stage::Contact,
+            Of::Radius => Stage::Kinematics,
+        }
     }
     fn parameters(&self, context: &Context) -> Vec<Parameter> {
-        self.form.parameters(context, LIMIT)
+        let limit = match self.of {
+            Of::Drag => LIMIT,
+            Of::Radius => LIMIT_OF_RADIUS,
+        };
+        self.form.parameters(context, limit)
     }
     fn starts(
         &self,
         context: &Context,
-        _series: &[Series],
+        series: &[Series],
         _evidence: &[Evidence],
     ) -> Vec<Vec<f64>> {
+        // Without the wheel's balance a radius that varies is the same as an encoder that ripples, which is common.
+        if self.of == Of::Radius && series.iter().all(|s| s.wheel_balance.is_empty()) {
+            return Vec::new();
+        }
         self.form.starts(context)
     }
     fn equation(&self) -> &'static str {
-        "drag = normal_force mu(slip) (1 + sum a_k cos(k angle) + b_k sin(k angle))"
+        match self.of {
+            Of::Drag => {
+                "drag = normal_force mu(slip) (1 + sum a_k cos(k angle) + b_k sin(k angle))"
+            }
+            Of::Radius => "slip = 1 - radius (1 + a cos(angle) + b sin(angle)) omega / v",
+        }
     }
     fn statement(&self, reported: &[Reported<f64>], _p: &[f64]) -> String {
-        format!(
-            "drag varies once a wheel revolution by {:.2} % of itself",
-            100.0 * reported[0].value
-        )
+        let percent = 100.0 * reported[0].value;
+        match self.of {
+            Of::Drag => format!("drag varies once a wheel revolution by {percent:.2} % of itself"),
+            Of::Radius => format!(
+                "the rolling radius varies once a wheel revolution; the drag at half the critical slip by {percent:.2} % of itself"
+            ),
+        }
     }
     fn predicts(&self) -> bool {
         !self.form.phase_per_run
     }
+    fn rare(&self) -> bool {
+        self.of == Of::Radius
+    }
     fn guide(&self) -> Guide {
         Guide {
-            physics: "A wheel or a drum that is out of round presses harder and less hard once a revolution, and a tyre is not equally stiff all around. The drag varies with the wheel's angle, in proportion to itself.",
+            physics: "A wheel or a drum that is out of round presses harder and less hard once a revolution, and a tyre is not equally stiff or equally large all around. The drag varies with the wheel's angle: in proportion to itself, or as the slip that a varying radius makes.",
             kind: Kind::Wheel,
             touches: &[Balance::Tyre],
             memory: Memory::None,
@@ -75,20 +114,38 @@ impl Describe for RunOut {
 }
 
 impl<T: Number> Mechanism<T> for RunOut {
-    fn apply(&self, p: &[T], series: &Series, _context: &Context, state: &mut State<T>) {
-        if let Some(ripple) = self.form.ripple(p, series) {
-            for (force, r) in state.force.iter_mut().zip(ripple) {
-                *force = *force * (r + 1.0);
+    fn apply(&self, p: &[T], series: &Series, context: &Context, state: &mut State<T>) {
+        if let Some(ripple) = self.form.ripple(p, series, &|_, _| 1.0) {
+            match self.of {
+                Of::Drag => {
+                    for (force, r) in state.force.iter_mut().zip(ripple) {
+                        *force = *force * (r + 1.0);
+                    }
+                }
+                Of::Radius => {
+                    let n = ripple.len();
+                    let radius = state
+                        .radius
+                        .get_or_insert_with(|| vec![T::constant(context.radius); n]);
+                    for (radius, r) in radius.iter_mut().zip(ripple) {
+                        *radius = *radius * (r + 1.0);
+                    }
+                }
             }
         }
     }
     fn report(
         &self,
         p: &[T],
-        _law: &Law<T>,
+        law: &Law<T>,
         _context: &Context,
         _series: &[Series],
     ) -> Vec<Reported<T>> {
-        self.form.report(p, 1.0)
+        let factor = match self.of {
+            Of::Drag => 1.0,
+            // On the base curve d ln mu / d slip is 1.2 / critical slip at half of that.
+            Of::Radius => 1.2 / law.critical.value(),
+        };
+        self.form.report(p, factor)
     }
 }

@@ -9,21 +9,46 @@ use super::{
 use crate::number::Number;
 use crate::prepare::Series;
 
+/// How much of the force passes through what rings.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Form {
+    /// All of it: one mode.
+    Whole,
+    /// A share: the mode is one of several, the others far above.
+    Share,
+}
+
+/// All forms.
+pub const FORMS: [Form; 2] = [Form::Whole, Form::Share];
+
 /// The load cell and its mount ring: a lightly damped second-order response.
-pub struct StructuralResonance;
+pub struct StructuralResonance {
+    /// Which form.
+    pub form: Form,
+}
 
 impl Describe for StructuralResonance {
     fn id(&self) -> Id {
         Id::StructuralResonance
     }
+    fn form(&self) -> &'static str {
+        match self.form {
+            Form::Whole => "",
+            Form::Share => "share",
+        }
+    }
     fn stage(&self) -> Stage {
         Stage::Chain
     }
     fn parameters(&self, context: &Context) -> Vec<Parameter> {
-        vec![
+        let mut all = vec![
             Parameter::new("frequency", "Hz", 2.0, 0.45 / context.dt),
             Parameter::new("damping_ratio", "1", 0.002, 0.3),
-        ]
+        ];
+        if self.form == Form::Share {
+            all.push(Parameter::new("share", "1", 0.0, 1.5));
+        }
+        all
     }
     fn starts(
         &self,
@@ -35,18 +60,29 @@ impl Describe for StructuralResonance {
         let mut starts = Vec::new();
         let mut frequency = 4.0;
         while frequency < top.min(150.0) {
-            for damping in [0.03, 0.15] {
-                starts.push(vec![frequency, damping]);
+            match self.form {
+                Form::Whole => starts.extend([0.03, 0.15].map(|zeta| vec![frequency, zeta])),
+                Form::Share => starts.push(vec![frequency, 0.03, 0.0]),
             }
             frequency *= 1.19;
         }
         starts
     }
     fn amplitude(&self) -> Option<usize> {
-        None
+        match self.form {
+            Form::Whole => None,
+            Form::Share => Some(2),
+        }
     }
     fn equation(&self) -> &'static str {
-        "reading'' + 2 zeta W reading' + W^2 reading = W^2 drag, W = 2 pi frequency"
+        match self.form {
+            Form::Whole => {
+                "reading'' + 2 zeta W reading' + W^2 reading = W^2 drag, W = 2 pi frequency"
+            }
+            Form::Share => {
+                "reading = drag + share (y - drag), y'' + 2 zeta W y' + W^2 y = W^2 drag, W = 2 pi frequency"
+            }
+        }
     }
     fn statement(&self, reported: &[Reported<f64>], _p: &[f64]) -> String {
         format!(
@@ -87,7 +123,16 @@ impl Describe for StructuralResonance {
 
 impl<T: Number> Mechanism<T> for StructuralResonance {
     fn apply(&self, p: &[T], series: &Series, _context: &Context, state: &mut State<T>) {
-        second_order(&mut state.force, &series.dt, p[0], p[1]);
+        match self.form {
+            Form::Whole => second_order(&mut state.force, &series.dt, p[0], p[1]),
+            Form::Share => {
+                let mut ringing = state.force.clone();
+                second_order(&mut ringing, &series.dt, p[0], p[1]);
+                for (y, ringing) in state.force.iter_mut().zip(ringing) {
+                    *y += p[2] * (ringing - *y);
+                }
+            }
+        }
     }
     fn report(
         &self,

@@ -8,7 +8,11 @@ use super::{
 use crate::number::Number;
 use crate::prepare::Series;
 
+/// Longest stretches that are searched for, as shares of the track.
+const LONGEST: [f64; 3] = [1.0, 0.35, 0.12];
+
 /// Search over stretches of track: residual against predicted drag, by bins of distance.
+#[derive(Clone)]
 struct Scan {
     bin: f64,
     /// Σ w f r and Σ w f² by bin.
@@ -39,14 +43,16 @@ impl Scan {
         scan
     }
 
-    /// Start, length and relative change of the stretch that explains most beyond a common factor.
-    fn best(&self) -> Option<(f64, f64, f64)> {
+    /// Start, length and relative change of the stretch, no longer than this share of the track, that explains most
+    /// beyond a common factor.
+    fn best(&self, longest: f64) -> Option<(f64, f64, f64)> {
+        let most = (longest * Self::BINS as f64) as usize;
         let all_cross: f64 = self.cross.iter().sum();
         let all_power: f64 = self.power.iter().sum();
         let mut best: Option<(f64, (f64, f64, f64))> = None;
         for from in 0..Self::BINS {
             let (mut c, mut q) = (0.0, 0.0);
-            for to in from..Self::BINS {
+            for to in from..Self::BINS.min(from + most) {
                 c += self.cross[to];
                 q += self.power[to];
                 let rest = all_power - q;
@@ -111,16 +117,24 @@ impl Describe for SurfacePatch {
         all
     }
     fn starts(&self, context: &Context, series: &[Series], evidence: &[Evidence]) -> Vec<Vec<f64>> {
-        let mut scan = Scan::new(context, series, evidence);
-        let mut start = Vec::new();
-        for _ in 0..self.patches {
-            let Some((from, length, change)) = scan.best() else {
-                return Vec::new();
-            };
-            start.extend([from, length, 0.8 * change]);
-            scan.take(from, length, change);
+        let fresh = Scan::new(context, series, evidence);
+        let mut starts: Vec<Vec<f64>> = Vec::new();
+        // What differs over most of the track hides shorter stretches.
+        for longest in LONGEST {
+            let mut scan = fresh.clone();
+            let mut start = Vec::new();
+            for _ in 0..self.patches {
+                let Some((from, length, change)) = scan.best(longest) else {
+                    break;
+                };
+                start.extend([from, length, 0.8 * change]);
+                scan.take(from, length, change);
+            }
+            if start.len() == 3 * self.patches && !starts.contains(&start) {
+                starts.push(start);
+            }
         }
-        vec![start]
+        starts
     }
     fn amplitude(&self) -> Option<usize> {
         Some(2)

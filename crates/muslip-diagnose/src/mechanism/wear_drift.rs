@@ -77,6 +77,9 @@ impl Describe for WearDrift {
                 .collect(),
         }
     }
+    fn by_order(&self, _context: &Context) -> bool {
+        true
+    }
     fn equation(&self) -> &'static str {
         match self.form {
             Form::Energy => {
@@ -121,7 +124,7 @@ impl Describe for WearDrift {
             smallest: "three percent of friction from the first run to the last",
             smallest_size: |_| 0.03,
             compensation: Compensation::Not("the filter has no compensation for it"),
-            carried: "by the order of runs: a fresh run comes after all others, with all their energy spent",
+            carried: "not to a run whose place in the campaign is not known: that is predicted by the law that fits all runs best without it",
             example: Example {
                 form: "energy",
                 parameters: &[0.15],

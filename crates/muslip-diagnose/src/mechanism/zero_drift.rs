@@ -104,6 +104,9 @@ impl Describe for ZeroDrift {
             _ => Vec::new(),
         }
     }
+    fn by_order(&self, context: &Context) -> bool {
+        self.form.cumulative() && !context.clock_continues
+    }
     fn equation(&self) -> &'static str {
         match self.form {
             Form::Linear | Form::LinearCumulative => "reading = drag + slope * t",
@@ -137,7 +140,7 @@ impl Describe for ZeroDrift {
             smallest: "a reading's noise, over the whole run",
             smallest_size: |c| c.drag_sigma,
             compensation: Compensation::By("takes the zero at the sample's time off the drag"),
-            carried: "by the clock: of each run, or of the whole campaign where it goes on through all runs",
+            carried: "by the clock: of each run, or of the whole campaign where it goes on through all runs; there a run without the campaign's clock is predicted without it",
             example: Example {
                 form: "linear_in_run",
                 parameters: &[60.0],
