@@ -43,7 +43,7 @@ impl Describe for StructuralResonance {
     fn parameters(&self, context: &Context) -> Vec<Parameter> {
         let mut all = vec![
             Parameter::new("frequency", "Hz", 2.0, 0.45 / context.dt),
-            Parameter::new("damping_ratio", "1", 0.002, 0.3),
+            Parameter::new("damping_ratio", "1", 0.002, self.most_damping()),
         ];
         if self.form == Form::Share {
             all.push(Parameter::new("share", "1", 0.0, 1.5));
@@ -117,6 +117,16 @@ impl Describe for StructuralResonance {
                 form: "",
                 parameters: &[18.0, 0.05],
             },
+        }
+    }
+}
+
+impl StructuralResonance {
+    /// A share that hardly rings is any difference between two filters.
+    fn most_damping(&self) -> f64 {
+        match self.form {
+            Form::Whole => 0.3,
+            Form::Share => 0.1,
         }
     }
 }

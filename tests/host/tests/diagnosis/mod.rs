@@ -106,6 +106,7 @@ pub fn repaired() -> Repaired {
         proof: Predicting::default(),
         base_alone: vec![0.82_f64.ln(), 0.141_f64.ln(), 0.0, 0.0, 0.0],
         base: vec![0.85_f64.ln(), 0.13_f64.ln(), 0.0, 0.0, 0.0],
+        base_unplaced: Vec::new(),
         tyre: vec![
             RepairedTerm {
                 id: "force_lag".into(),
