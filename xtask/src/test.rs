@@ -86,6 +86,21 @@ pub fn run_all() -> Result<()> {
         }
     }
 
+    for target in TARGETS {
+        run(
+            &format!("live innovations for {target}"),
+            cargo(&[
+                "build",
+                "--package",
+                "muslip-innovations",
+                "--locked",
+                "--quiet",
+                "--target",
+                target,
+            ]),
+        )?;
+    }
+
     cycles::check()?;
 
     firmware::test()?;

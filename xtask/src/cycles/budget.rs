@@ -3,12 +3,39 @@
 use std::collections::BTreeMap;
 use std::fs;
 
-use anyhow::{Result, bail, ensure};
+use anyhow::{Context, Result, bail, ensure};
 
 use crate::figures::figures;
+use crate::firmware::CYCLES_PER_SAMPLE;
 use crate::step::root;
 
 const BUDGETS: &str = ".ci/cycles.toml";
+const SHARES: &str = ".ci/budgets.toml";
+
+/// Percent of a sample that the live innovations may take at their worst.
+pub fn sample_percent() -> Result<u64> {
+    figures(&fs::read_to_string(root().join(SHARES))?)?
+        .remove("innovations_percent")
+        .with_context(|| format!("{SHARES} has no innovations_percent"))
+}
+
+/// A sample's cycles in percent of all between two samples at 1 kHz.
+pub fn percent_of_sample(cycles: i64) -> f64 {
+    100.0 * cycles as f64 / CYCLES_PER_SAMPLE as f64
+}
+
+/// The worst call of a candidate against its share of a sample.
+pub fn check_sample(name: &str, most_cycles: i64, percent: u64) -> Result<()> {
+    let share = percent_of_sample(most_cycles);
+    ensure!(
+        share <= percent as f64,
+        "{name}: {most_cycles} cycles at the worst are {share:.1} % of the {CYCLES_PER_SAMPLE} of a sample at 1 kHz, over the {percent} % of {SHARES}"
+    );
+    println!(
+        "{name}: {most_cycles} cycles at the worst, {share:.1} % of a sample, of at most {percent} %"
+    );
+    Ok(())
+}
 
 /// Counts against the file of budgets: equal, or an error that names all that are not.
 ///
@@ -64,8 +91,20 @@ fn compare(counts: &[(String, u64)], budgets: &BTreeMap<String, u64>) -> Result<
 
 #[cfg(test)]
 mod tests {
-    use super::{compare, tampered};
+    use super::{check_sample, compare, tampered};
     use crate::figures::figures;
+
+    #[test]
+    fn a_sample_over_its_share_is_refused_and_one_at_it_is_not() {
+        check_sample("innovations", 16_800, 10).unwrap();
+        let message = check_sample("innovations", 16_801, 10)
+            .unwrap_err()
+            .to_string();
+        assert!(
+            message.contains("16801 cycles") && message.contains("10 %"),
+            "{message}"
+        );
+    }
 
     #[test]
     fn a_count_that_is_not_its_budget_is_named() {

@@ -2,6 +2,7 @@
 
 use std::fmt::Write;
 
+use super::budget::percent_of_sample;
 use super::{Candidate, Core, Cost};
 
 type Row = (Candidate, Cost);
@@ -14,8 +15,8 @@ const CAMPAIGN: [(&str, f64, f64); 4] = [
     ("minikalman", 172.0, 238.0),
 ];
 
-/// A markdown table with the bars beside the figures.
-pub fn markdown(rows: &[Row]) -> String {
+/// A markdown table with the bars beside the figures; what fills a sample may take `percent` of it.
+pub fn markdown(rows: &[Row], percent: u64) -> String {
     let mut table = String::from(
         "| candidate | core | opt | instructions, mean and most | cycles, mean and most | text, bytes | stack, bytes | final mup, sp in millionths | bar and figure |\n\
          | --- | --- | --- | --- | --- | --- | --- | --- | --- |\n",
@@ -38,7 +39,7 @@ pub fn markdown(rows: &[Row]) -> String {
             cost.text_bytes,
             cost.stack_bytes,
             cost.answer,
-            bars(rows, candidate, cost).join("; ")
+            bars(rows, candidate, cost, percent).join("; ")
         );
     }
     table
@@ -50,7 +51,7 @@ fn at_most(what: &str, bar: f64, figure: f64, digits: usize) -> String {
     format!("{what} at most {bar}: {figure:.digits$}, {verdict}")
 }
 
-fn bars(rows: &[Row], candidate: &Candidate, cost: &Cost) -> Vec<String> {
+fn bars(rows: &[Row], candidate: &Candidate, cost: &Cost, percent: u64) -> Vec<String> {
     if candidate.core != Core::M4F || candidate.opt != "3" {
         return Vec::new();
     }
@@ -73,6 +74,10 @@ fn bars(rows: &[Row], candidate: &Candidate, cost: &Cost) -> Vec<String> {
                 at_most("mean cycles over the lean update's", 2.5, cycles / lean, 2),
                 format!("worst over it {:.2}", cost.most_cycles as f64 / lean),
             ]
+        }
+        "innovations" => {
+            let share = percent_of_sample(cost.most_cycles);
+            vec![at_most("worst in % of 168000 cycles", percent as f64, share, 1)]
         }
         name => CAMPAIGN
             .iter()

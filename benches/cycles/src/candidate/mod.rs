@@ -8,6 +8,7 @@
 #[cfg_attr(feature = "efficient", path = "efficient.rs")]
 #[cfg_attr(feature = "slip_friction", path = "slip_friction.rs")]
 #[cfg_attr(feature = "quarter_car", path = "quarter_car.rs")]
+#[cfg_attr(feature = "innovations", path = "innovations.rs")]
 #[cfg_attr(feature = "nalgebra", path = "by_nalgebra.rs")]
 #[cfg_attr(feature = "minikalman", path = "by_minikalman.rs")]
 #[cfg_attr(feature = "adskalman", path = "by_adskalman.rs")]
