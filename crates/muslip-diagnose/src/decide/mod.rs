@@ -8,6 +8,7 @@ use finalists::{Screen, effort};
 use rank::{ALIKE_NATS, rank};
 pub use rank::{PREDICTED_APART, softness};
 use trial::Before;
+use trial::left_open;
 pub use trial::{Claim, Trial, stands, through_force};
 
 use crate::data::Data;
@@ -33,6 +34,9 @@ pub struct Decision {
     pub chosen: Judged,
     /// Trials of each round, best first.
     pub rounds: Vec<Vec<Trial>>,
+    /// What is left beside the chosen model: the free dependence that gains most where the noise is no larger than the
+    /// sensors make plausible.
+    pub left: Option<Trial>,
     /// How large each mechanism would have to be to be seen beside the base model.
     pub seen: Vec<Seen>,
 }
@@ -83,6 +87,7 @@ pub fn decide(data: &Data, mut base: Judged, excluded: &[Id], chain_s: f64) -> D
     let mut rounds = Vec::new();
     let mut seen = None;
     let mut named: Vec<Named> = Vec::new();
+    let mut left = None;
     let free = dependence::all(data);
     while chosen.model.terms.len() + chosen.extra.len() < MOST_NAMES {
         let screen = Screen::new(data, &chosen, &free, excluded, chain_s);
@@ -110,6 +115,11 @@ pub fn decide(data: &Data, mut base: Judged, excluded: &[Id], chain_s: f64) -> D
             chosen = better;
             next = taken_up(data, &trials, &named).cloned();
         }
+        if next.is_none() {
+            let open = trials.iter().filter(|t| left_open(t));
+            let most = open.max_by(|a, b| a.at_sensors.0.total_cmp(&b.at_sensors.0));
+            left = most.cloned();
+        }
         rounds.push(trials);
         match next {
             Some(trial) => {
@@ -126,6 +136,7 @@ pub fn decide(data: &Data, mut base: Judged, excluded: &[Id], chain_s: f64) -> D
         base,
         chosen,
         rounds,
+        left,
         seen: seen.unwrap_or_default(),
     }
 }

@@ -6,6 +6,7 @@ use super::Answer;
 use crate::audit::Timing;
 use crate::decide::{Claim, PREDICTED_APART, Trial, softness, stands};
 use crate::figures::figures;
+use crate::innovations::dependence::Dependence;
 use crate::mechanism::{Id, Reported};
 use crate::number::finite_or_zero;
 use crate::outcome::{Alternative, Evidence, Figure, NamedMechanism, Unexplained, sentence};
@@ -87,36 +88,38 @@ impl Answer<'_> {
             .collect()
     }
 
+    /// What no name accounts for: dependences of the chosen model, and the one that is left beside it.
     pub(super) fn unexplained(&self) -> Vec<Unexplained> {
         let gained: f64 = (self.decision.base.loss - self.decision.chosen.loss).max(1e-9);
-        self.decision
-            .chosen
-            .extra
-            .iter()
-            .map(|own| {
-                let gain = self
-                    .decision
-                    .rounds
-                    .iter()
-                    .flatten()
-                    .find_map(|t| match &t.claim {
-                        Claim::Dependence(d)
-                            if d.variable == own.variable && d.balance == own.balance =>
-                        {
-                            Some(t.gain)
-                        }
-                        _ => None,
-                    })
-                    .unwrap_or(0.0);
-                Unexplained {
-                    balance: own.balance.as_str(),
-                    variable: own.variable.word(&self.data),
-                    form: String::new(),
-                    z: finite_or_zero((2.0 * gain.max(0.0)).sqrt()),
-                    share: (gain / gained).clamp(0.0, 1.0),
-                }
-            })
-            .collect()
+        let left = self.decision.left.iter().filter_map(|t| match &t.claim {
+            Claim::Dependence(own) => Some((own, t.at_sensors.0, gained + t.at_sensors.0)),
+            Claim::Mechanism(..) => None,
+        });
+        let told = |(own, gain, of): (&Dependence, f64, f64)| Unexplained {
+            balance: own.balance.as_str(),
+            variable: own.variable.word(&self.data),
+            form: String::new(),
+            z: finite_or_zero((2.0 * gain.max(0.0)).sqrt()),
+            share: (gain / of).clamp(0.0, 1.0),
+        };
+        let chosen = self.decision.chosen.extra.iter().map(|own| {
+            let gain = self
+                .decision
+                .rounds
+                .iter()
+                .flatten()
+                .find_map(|t| match &t.claim {
+                    Claim::Dependence(d)
+                        if d.variable == own.variable && d.balance == own.balance =>
+                    {
+                        Some(t.gain)
+                    }
+                    _ => None,
+                })
+                .unwrap_or(0.0);
+            (own, gain, gained)
+        });
+        chosen.chain(left).map(told).collect()
     }
 
     /// Delays of the speeds that the base simulation's residuals show.
