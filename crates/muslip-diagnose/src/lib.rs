@@ -30,6 +30,7 @@ pub mod audit;
 pub mod campaign;
 pub mod chain;
 mod cleaning;
+mod constants;
 pub mod correction;
 pub mod data;
 mod decide;

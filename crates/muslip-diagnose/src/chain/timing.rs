@@ -4,6 +4,10 @@ use super::correct::{Lateness, TimingStd};
 use super::held::without_holds;
 use crate::audit::{Audit, Timing as Late};
 use crate::campaign::{Rig, Run};
+use crate::constants::{
+    ALIKE_LATE, ALIKE_LATE_S, AUDIT_REACH, LEAST_BRAKE_EARLY_S, LEAST_DRAG_LATE_S, LEAST_RELIABLE,
+    LEAST_STD_S, LEAST_USABLE, UNKNOWN_STDS, VAGUE_S,
+};
 use crate::data::Data;
 use crate::innovations::blocks::blocks;
 use crate::innovations::gram::{solve, total};
@@ -46,7 +50,8 @@ impl Timing {
         let known = || all.iter().filter(|l| l.std < VAGUE_S);
         let weight: f64 = known().map(|l| l.std.powi(-2)).sum();
         let mean = known().map(|l| -l.value * l.std.powi(-2)).sum::<f64>() / weight;
-        let alike = |l: &Late| (-l.value - mean).abs() < ALIKE * mean + ALIKE_S + 2.0 * l.std;
+        let alike =
+            |l: &Late| (-l.value - mean).abs() < ALIKE_LATE * mean + ALIKE_LATE_S + 2.0 * l.std;
         // A brake alone says as little of the drag as the drag does of it.
         let speed = [self.wheel, self.vehicle].iter().any(|l| l.std < VAGUE_S);
         (speed && mean > LEAST_DRAG_LATE_S && known().all(alike)).then_some(mean)
@@ -94,23 +99,6 @@ const ENOUGH_SAMPLES: usize = 24_000;
 const PASSES: usize = 5;
 /// Largest shift in one pass in s.
 const MOST_SHIFT_S: f64 = 0.03;
-/// Standard deviations of the audit's lateness within which it is refined.
-const AUDIT_REACH: f64 = 2.0;
-/// By what share of the drag's lateness, and by how many seconds more, the others may differ in being early.
-const ALIKE: f64 = 0.35;
-const ALIKE_S: f64 = 1.5e-3;
-/// Least lateness of the drag in s that is left to be explained.
-const LEAST_DRAG_LATE_S: f64 = 2e-3;
-/// Least time in s by which a brake is read before its torque that no filters of the channels account for.
-const LEAST_BRAKE_EARLY_S: f64 = 0.02;
-/// Largest standard deviation in s of a lateness that says anything of the drag's.
-const VAGUE_S: f64 = 2e-3;
-/// Standard deviations that timing may be off by without being seen.
-const UNKNOWN_STDS: f64 = 3.0;
-/// Best to which timing is ever known, in s.
-const LEAST_STD_S: f64 = 5e-4;
-/// Least share of a speed's rate that is taken for the speed's.
-const LEAST_RELIABLE: f64 = 0.02;
 /// A shift that matters no more, in s.
 const SMALL_SHIFT_S: f64 = 1e-4;
 
@@ -157,9 +145,6 @@ fn at_one_time(
     data.timing_std = known_to(audit);
     data
 }
-
-/// Fewest samples of all balances that anything can be said of.
-const LEAST_USABLE: usize = 60;
 
 /// Samples that enter a balance.
 fn usable(data: &Data) -> usize {

@@ -5,7 +5,8 @@ use std::collections::BTreeMap;
 use rayon::prelude::*;
 
 use super::rank::rank;
-use super::trial::{Before, Claim, LEAST_GAIN, PRICE_OF_NAME, PRICE_OF_PARAMETER, Trial};
+use super::trial::{Before, Claim, Trial};
+use crate::constants::{LEAST_GAIN, PRICE_OF_NAME, PRICE_OF_PARAMETER};
 use crate::data::Data;
 use crate::innovations::candidates::{Candidate, Table, table};
 use crate::innovations::dependence::Dependence;

@@ -5,12 +5,12 @@ mod rank;
 mod trial;
 
 use finalists::{Screen, effort};
-use rank::{ALIKE_NATS, rank};
-pub use rank::{PREDICTED_APART, softness};
-use trial::Before;
-use trial::left_open;
+use rank::rank;
+pub use rank::softness;
+use trial::{Before, left_open};
 pub use trial::{Claim, Trial, stands, through_force};
 
+use crate::constants::{ALIKE_NATS, DEPENDENCE_NATS, DEPENDENCE_SHARE, FORM_LEFT};
 use crate::data::Data;
 use crate::innovations::dependence::{self, Dependence};
 use crate::innovations::hypothesis::{Guess, Judged, judge};
@@ -18,11 +18,6 @@ use crate::looked::Seen;
 use crate::mechanism::Id;
 use crate::model::Model;
 
-/// A free dependence is said instead of a mechanism where it gains so many times as much, and so many nats more.
-const DEPENDENCE_SHARE: f64 = 1.33;
-const DEPENDENCE_NATS: f64 = 15.0;
-/// Share of a name's weight below which its alias, weighed beside it, is what its own form leaves.
-const FORM_LEFT: f64 = 0.1;
 /// Most names.
 const MOST_NAMES: usize = 3;
 

@@ -1,16 +1,8 @@
 //! The order of a round's trials.
 
 use super::trial::{Claim, Trial};
+use crate::constants::{ALIKE_NATS, ALIKE_SHARE, PREDICTED_APART, SOFT_SHARE, SOFTNESS};
 use crate::data::Data;
-
-/// Gains in nats that differ by less are alike.
-pub const ALIKE_NATS: f64 = 0.5;
-/// Softness of the choice between two names in nats, and as a share of what the better one gains.
-const SOFTNESS: f64 = 4.0;
-const SOFT_SHARE: f64 = 0.03;
-/// Of names that gain alike, to this share, the one comes first that predicts the drag better by this logarithm.
-const ALIKE_SHARE: f64 = 0.7;
-pub const PREDICTED_APART: f64 = 0.1;
 
 /// Best first; of those that gain alike, the one first that claims the least.
 pub fn rank(data: &Data, trials: &mut [Trial]) {

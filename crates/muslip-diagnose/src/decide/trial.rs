@@ -1,5 +1,12 @@
 //! What a claim gains beside the model so far, and whether it stands.
 
+use crate::constants::{
+    DEPENDENCE_WORTH, LEAST_EFFECT, LEAST_GAIN, LEAST_GAIN_AT_SENSORS,
+    LEAST_GAIN_OF_DEPENDENCE_AT_SENSORS, LEAST_MEMORY_S, LEAST_PREDICTED,
+    LEAST_PREDICTED_BY_DEPENDENCE, LEAST_T, LEAST_T_AT_SENSORS, LEAST_T_OF_DEPENDENCE,
+    LEAST_T_OF_DEPENDENCE_AT_SENSORS, PRICE_OF_NAME, PRICE_OF_PARAMETER, REAL_MEMORY_PREDICTED,
+    REAL_MEMORY_T, RINGING,
+};
 use crate::data::Data;
 use crate::innovations::dependence::Dependence;
 use crate::innovations::hypothesis::{Judged, Unseen, capped};
@@ -7,40 +14,6 @@ use crate::innovations::noise::BalanceParts;
 use crate::law::{closest, left_of};
 use crate::mechanism::{Balance, Id};
 use crate::model::Model;
-
-/// Price of a free parameter in nats: about half the logarithm of the independent readings.
-pub const PRICE_OF_PARAMETER: f64 = 4.0;
-/// Price of a choice among the vocabulary in nats.
-pub const PRICE_OF_NAME: f64 = 3.4;
-/// Least gain in nats, all prices taken off.
-pub const LEAST_GAIN: f64 = 5.0;
-/// Least effect that is worth a name, as a share of one whitened reading's standard deviation: of the gain, half
-/// its square a reading.
-const LEAST_EFFECT: f64 = 0.07;
-/// Least t of the gains on unseen runs: about Student's at five percent, one-sided, for as many runs as campaigns have.
-const LEAST_T: f64 = 2.0;
-/// Where the runs' own differences hide an effect: least gain in nats at the noise that the sensors make plausible, and
-/// least t of its signed roots. What measuring chains leave gains less, or unevenly.
-const LEAST_GAIN_AT_SENSORS: f64 = 20.0;
-const LEAST_T_AT_SENSORS: f64 = 4.0;
-/// The same of a free dependence, which has more parameters and follows more of what chains leave.
-const LEAST_OF_DEPENDENCE_AT_SENSORS: (f64, f64) = (150.0, 2.4);
-/// Logarithm by which a hidden dependence lowers the mean square error of the drag at least.
-const LEAST_PREDICTED_BY_DEPENDENCE: f64 = 0.05;
-/// Least t of a free dependence's gains on unseen runs: it says nothing of what it is.
-const LEAST_T_OF_DEPENDENCE: f64 = 3.0;
-/// Least gain of a free dependence over that of the least effect worth a name.
-const DEPENDENCE_WORTH: f64 = 3.0;
-/// Logarithm by which a memory that the chain might have lowers the mean square error of the drag, and the least t of its
-/// gains, where it is real: kernels that differ lower none.
-const REAL_MEMORY: (f64, f64) = (0.25, 2.5);
-/// Damping ratio below which a response rings longer than any filter of a chain: the least damped pole of a fourth-order
-/// Butterworth filter has 0.38.
-const RINGING: f64 = 0.12;
-/// Least memory in s that is told from a chain without any error of timing.
-const LEAST_MEMORY_S: f64 = 2.5e-3;
-/// Least logarithm by which a name that works through the force lowers the mean square error of the drag.
-const LEAST_PREDICTED: f64 = 0.01;
 
 /// What a trial adds to a model.
 #[derive(Clone)]
@@ -227,8 +200,8 @@ impl<'a> Before<'a> {
         let outlasts_chain = match &claim {
             Claim::Mechanism(id, entry) => {
                 let least = least_memory_s(data, *id, *entry);
-                let (lower, t) = REAL_MEMORY;
-                let real = in_force && predicts > lower && at_sensors.1 > t;
+                let real =
+                    in_force && predicts > REAL_MEMORY_PREDICTED && at_sensors.1 > REAL_MEMORY_T;
                 let chain_s = if real { 0.0 } else { self.chain_s };
                 memory_s(data, *id, *entry, &judged.model)
                     .is_none_or(|memory| memory > least.max(chain_s))
@@ -342,18 +315,20 @@ fn seen_at_sensors(trial: &Trial) -> bool {
     if trial.mechanism().is_some() {
         return sum > LEAST_GAIN_AT_SENSORS && t > LEAST_T_AT_SENSORS;
     }
-    let (least, least_t) = LEAST_OF_DEPENDENCE_AT_SENSORS;
-    let predicts = trial.predicts > LEAST_PREDICTED_BY_DEPENDENCE;
-    predicts && sum > least && t > least_t
+    trial.predicts > LEAST_PREDICTED_BY_DEPENDENCE && dependence_at_sensors(trial)
+}
+
+/// Whether unseen runs gain by a free dependence at the sensors' noise.
+fn dependence_at_sensors(trial: &Trial) -> bool {
+    let (sum, t) = trial.at_sensors;
+    sum > LEAST_GAIN_OF_DEPENDENCE_AT_SENSORS && t > LEAST_T_OF_DEPENDENCE_AT_SENSORS
 }
 
 /// Whether a free dependence that does not stand is still to be told: noise that the sensors do not make plausible
 /// swallows it, and the drag is predicted no better with it, but all runs show it.
 #[must_use]
 pub fn left_open(trial: &Trial) -> bool {
-    let (least, least_t) = LEAST_OF_DEPENDENCE_AT_SENSORS;
-    let (sum, t) = trial.at_sensors;
-    trial.mechanism().is_none() && !stands(trial) && sum > least && t > least_t
+    trial.mechanism().is_none() && !stands(trial) && dependence_at_sensors(trial)
 }
 
 /// Whether unseen runs gain, and alike.

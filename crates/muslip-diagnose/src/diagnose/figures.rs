@@ -3,7 +3,8 @@
 use std::collections::BTreeMap;
 
 use super::Answer;
-use super::named::{VAGUE_DELAY_S, least_delay};
+use super::named::least_delay;
+use crate::constants::VAGUE_DELAY_S;
 use crate::looked::{POWER, looked_for};
 use crate::mechanism::{Balance, Id};
 use crate::number::finite_or_zero;

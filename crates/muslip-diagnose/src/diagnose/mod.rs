@@ -14,6 +14,7 @@ use self::named::DELAYS;
 use crate::audit::{Audit, audit};
 use crate::campaign::{Rig, Run};
 use crate::chain::timing::{Timing, timed};
+use crate::constants::LEAST_OF_TYRE;
 use crate::data::Data;
 use crate::decide::{Decision, decide, through_force};
 use crate::innovations::hypothesis::Judged;
@@ -181,9 +182,6 @@ impl Given<'_> {
         faults
     }
 }
-
-/// Fewest samples of a run from which its tyre balance says anything.
-const LEAST_OF_TYRE: usize = 30;
 
 /// What the argument came to, made without what is kept.
 struct Answer<'a> {

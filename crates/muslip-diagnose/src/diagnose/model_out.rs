@@ -5,17 +5,13 @@ use nalgebra::DMatrix;
 use super::Answer;
 use crate::campaign::Run;
 use crate::chain::correct::Lateness;
+use crate::constants::{LEAST_GAIN_OF_PREDICTION, MOST_WORSE};
 use crate::law::closest;
 use crate::mechanism::Stage;
 use crate::model::{Model, TYRE_BASE};
 use crate::number::finite_or_zero;
 use crate::prepare::Series;
 use crate::repaired::{Domain, KnownRecording, NoiseModel, Repaired, RepairedTerm, Which};
-
-/// Least mean logarithm by which a repaired model lowers the square of a prediction's error: less is chance.
-const LEAST_GAIN_OF_PREDICTION: f64 = 0.02;
-/// Factor on the square of a recording's error that is still no worse.
-const MOST_WORSE: f64 = 1.002;
 
 /// Terms of a model with the covariance of all its parameters.
 struct Terms {

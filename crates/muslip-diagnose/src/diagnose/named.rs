@@ -4,7 +4,8 @@ use std::collections::BTreeMap;
 
 use super::Answer;
 use crate::audit::Timing;
-use crate::decide::{Claim, PREDICTED_APART, Trial, softness, stands};
+use crate::constants::{AUDITED, LEAST_DELAY_S, PREDICTED_APART, SURE_DELAY, VAGUE_DELAY_S};
+use crate::decide::{Claim, Trial, softness, stands};
 use crate::figures::figures;
 use crate::innovations::dependence::Dependence;
 use crate::mechanism::{Id, Reported};
@@ -12,13 +13,6 @@ use crate::number::finite_or_zero;
 use crate::outcome::{Alternative, Evidence, Figure, NamedMechanism, Unexplained, sentence};
 use crate::separating::separating_test;
 
-/// A delay is named where it is so many standard deviations and so many seconds from none.
-const SURE_DELAY: f64 = 5.0;
-const LEAST_DELAY_S: f64 = 1.5e-3;
-/// Largest standard deviation in s of a delay that is named.
-pub(super) const VAGUE_DELAY_S: f64 = 4e-3;
-/// Standard deviations by which the audit, too, has to find a delay.
-const AUDITED: f64 = 2.0;
 /// Delays that the timing names: no round weighs them.
 pub(super) const DELAYS: [Id; 2] = [Id::WheelSpeedDelay, Id::VehicleSpeedDelay];
 

@@ -1,0 +1,114 @@
+//! Every figure by which the engine decides, with what it is for and where it comes from; `audit::constants` has those of
+//! the audit. Steps and tolerances of a numerical method stand beside it: they cost time, and decide nothing.
+
+// What a gain is worth: nats of log likelihood.
+
+/// Price of a free parameter, nats: half the logarithm of some 3,000 independent readings of a campaign (Schwarz 1978, Ann.
+/// Stat. 6).
+pub const PRICE_OF_PARAMETER: f64 = 4.0;
+/// Price of a choice among the vocabulary, nats: the logarithm of 29 mechanisms.
+pub const PRICE_OF_NAME: f64 = 3.4;
+/// Least gain, nats, all prices taken off: one chance in 150 of a campaign.
+pub const LEAST_GAIN: f64 = 5.0;
+/// Least effect that is worth a name, as a share of one whitened reading's standard deviation: of the gain, half its
+/// square a reading. What no engineer would correct.
+pub const LEAST_EFFECT: f64 = 0.07;
+/// Least t of the gains on unseen runs: about Student's at five percent, one-sided, for as many runs as campaigns have.
+/// On development campaigns between 1 and 1.5 seventeen standing trials were false and one true.
+pub const LEAST_T: f64 = 2.0;
+/// Where the runs' own differences hide an effect: least gain at the noise that the sensors make plausible, nats. What
+/// measuring chains leave gains less, or unevenly.
+pub const LEAST_GAIN_AT_SENSORS: f64 = 20.0;
+/// As [`LEAST_GAIN_AT_SENSORS`]: least t of the gains' signed roots, which is about twice a plain t.
+pub const LEAST_T_AT_SENSORS: f64 = 4.0;
+
+// Names that gain alike.
+
+/// Gains that differ by less are alike, nats.
+pub const ALIKE_NATS: f64 = 0.5;
+/// Softness of the choice between two names, nats: no model of this kind is exactly true.
+pub const SOFTNESS: f64 = 4.0;
+/// As [`SOFTNESS`], as a share of what the better one gains.
+pub const SOFT_SHARE: f64 = 0.03;
+/// Share of another's gain from which a name that predicts the drag clearly better comes first.
+pub const ALIKE_SHARE: f64 = 0.7;
+/// Logarithm of the mean square error by which a prediction is clearly better.
+pub const PREDICTED_APART: f64 = 0.1;
+/// Share of a name's weight below which its alias, weighed beside it, is what its own form leaves: forms of the vocabulary
+/// are within some five percent of what they stand for.
+pub const FORM_LEFT: f64 = 0.1;
+
+// Free dependences.
+
+/// A free dependence is told instead of a mechanism where it gains so many times as much: a mechanism in the wrong form
+/// leaves less than a quarter.
+pub const DEPENDENCE_SHARE: f64 = 1.33;
+/// As [`DEPENDENCE_SHARE`], so many nats more: the price of its further parameters.
+pub const DEPENDENCE_NATS: f64 = 15.0;
+/// Least gain of a free dependence over that of the least effect worth a name.
+pub const DEPENDENCE_WORTH: f64 = 3.0;
+/// Least t of a free dependence's gains on unseen runs: it says nothing of what it is.
+pub const LEAST_T_OF_DEPENDENCE: f64 = 3.0;
+/// Least gain of a free dependence at the sensors' noise, nats: it has more parameters than a mechanism and follows more of
+/// what chains leave. None of 64 development campaigns that lack nothing has one.
+pub const LEAST_GAIN_OF_DEPENDENCE_AT_SENSORS: f64 = 150.0;
+/// As [`LEAST_GAIN_OF_DEPENDENCE_AT_SENSORS`]: least t of the gains' signed roots.
+pub const LEAST_T_OF_DEPENDENCE_AT_SENSORS: f64 = 2.4;
+/// Logarithm by which a hidden dependence lowers the mean square error of the drag at least.
+pub const LEAST_PREDICTED_BY_DEPENDENCE: f64 = 0.05;
+
+// What works through the force, and what remembers.
+
+/// Least logarithm by which a name that works through the force lowers the mean square error of the drag.
+pub const LEAST_PREDICTED: f64 = 0.01;
+/// Logarithm by which a memory as short as the chain's lowers the mean square error of the drag where it is real: kernels
+/// that differ lower none. True ones lower it by 0.2 to 0.4.
+pub const REAL_MEMORY_PREDICTED: f64 = 0.25;
+/// As [`REAL_MEMORY_PREDICTED`]: least t of the signed roots of its gains.
+pub const REAL_MEMORY_T: f64 = 2.5;
+/// Least memory that is told from a chain without any error of timing, s.
+pub const LEAST_MEMORY_S: f64 = 2.5e-3;
+/// Damping ratio below which a response rings longer than any filter of a chain: the least damped pole of a fourth-order
+/// Butterworth filter has 0.38.
+pub const RINGING: f64 = 0.12;
+
+// Timing of the channels.
+
+/// Standard deviations of the audit's lateness within which it is refined.
+pub const AUDIT_REACH: f64 = 2.0;
+/// By what share of the drag's lateness the others may differ in being early, where it is the drag that is late.
+pub const ALIKE_LATE: f64 = 0.35;
+/// As [`ALIKE_LATE`], by how many seconds more.
+pub const ALIKE_LATE_S: f64 = 1.5e-3;
+/// Least lateness of the drag that is left to be explained, s.
+pub const LEAST_DRAG_LATE_S: f64 = 2e-3;
+/// Least time by which a brake is read before its torque that no filters of the channels account for, s.
+pub const LEAST_BRAKE_EARLY_S: f64 = 0.02;
+/// Largest standard deviation of a lateness that says anything of the drag's, s.
+pub const VAGUE_S: f64 = 2e-3;
+/// Standard deviations that timing may be off by without being seen.
+pub const UNKNOWN_STDS: f64 = 3.0;
+/// Best to which timing is ever known, s.
+pub const LEAST_STD_S: f64 = 5e-4;
+/// Least share of a speed's rate that is taken for the speed's.
+pub const LEAST_RELIABLE: f64 = 0.02;
+/// A delay is named where it is so many standard deviations from none.
+pub const SURE_DELAY: f64 = 5.0;
+/// As [`SURE_DELAY`], from this size, s: what no engineer would correct.
+pub const LEAST_DELAY_S: f64 = 1.5e-3;
+/// Largest standard deviation of a delay that is named, s.
+pub const VAGUE_DELAY_S: f64 = 4e-3;
+/// Standard deviations by which the audit, too, has to find a delay: on development recordings three of eight that it did
+/// not find were false.
+pub const AUDITED: f64 = 2.0;
+
+// The repaired model.
+
+/// Least mean logarithm by which a repaired model lowers the square of a prediction's error: less is chance.
+pub const LEAST_GAIN_OF_PREDICTION: f64 = 0.02;
+/// Factor on the square of a recording's error that is still no worse.
+pub const MOST_WORSE: f64 = 1.002;
+/// Fewest samples of a run from which its tyre balance says anything.
+pub const LEAST_OF_TYRE: usize = 30;
+/// Fewest samples of all balances that anything can be said of.
+pub const LEAST_USABLE: usize = 60;
