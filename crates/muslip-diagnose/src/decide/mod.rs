@@ -29,11 +29,38 @@ pub struct Decision {
     pub chosen: Judged,
     /// Trials of each round, best first.
     pub rounds: Vec<Vec<Trial>>,
-    /// What is left beside the chosen model: the free dependence that gains most where the noise is no larger than the
-    /// sensors make plausible.
-    pub left: Option<Trial>,
+    /// What is left beside the chosen model.
+    pub left: Option<Left>,
     /// How large each mechanism would have to be to be seen beside the base model.
     pub seen: Vec<Seen>,
+}
+
+/// What is left beside a model: the free dependence that gains most where the noise is no larger than the sensors make
+/// plausible.
+pub struct Left {
+    /// It.
+    pub dependence: Dependence,
+    /// Its gain there in nats.
+    pub gain: f64,
+    /// That as a share of what was taken up and it gain together.
+    pub share: f64,
+}
+
+impl Left {
+    /// Of a round's trials; nothing where it is so small beside what was taken up that it is what that one's form leaves.
+    fn of(trials: &[Trial], taken_up: f64) -> Option<Self> {
+        let open = trials.iter().filter(|t| left_open(t));
+        let most = open.max_by(|a, b| a.at_sensors.0.total_cmp(&b.at_sensors.0))?;
+        let Claim::Dependence(dependence) = &most.claim else {
+            return None;
+        };
+        let gain = most.at_sensors.0;
+        (gain > FORM_LEFT * taken_up).then(|| Self {
+            dependence: dependence.clone(),
+            gain,
+            share: gain / (gain + taken_up),
+        })
+    }
 }
 
 /// A name that was taken up, and how much spoke for it.
@@ -83,6 +110,7 @@ pub fn decide(data: &Data, mut base: Judged, excluded: &[Id], chain_s: f64) -> D
     let mut seen = None;
     let mut named: Vec<Named> = Vec::new();
     let mut left = None;
+    let mut taken_up_gains = 0.0;
     let free = dependence::all(data);
     while chosen.model.terms.len() + chosen.extra.len() < MOST_NAMES {
         let screen = Screen::new(data, &chosen, &free, excluded, chain_s);
@@ -111,13 +139,12 @@ pub fn decide(data: &Data, mut base: Judged, excluded: &[Id], chain_s: f64) -> D
             next = taken_up(data, &trials, &named).cloned();
         }
         if next.is_none() {
-            let open = trials.iter().filter(|t| left_open(t));
-            let most = open.max_by(|a, b| a.at_sensors.0.total_cmp(&b.at_sensors.0));
-            left = most.cloned();
+            left = Left::of(&trials, taken_up_gains);
         }
         rounds.push(trials);
         match next {
             Some(trial) => {
+                taken_up_gains += trial.at_sensors.0.max(0.0);
                 named.extend(trial.mechanism().map(|(id, _)| (id, trial.weight())));
                 chosen = trial.judged;
             }

@@ -85,16 +85,14 @@ impl Answer<'_> {
     /// What no name accounts for: dependences of the chosen model, and the one that is left beside it.
     pub(super) fn unexplained(&self) -> Vec<Unexplained> {
         let gained: f64 = (self.decision.base.loss - self.decision.chosen.loss).max(1e-9);
-        let left = self.decision.left.iter().filter_map(|t| match &t.claim {
-            Claim::Dependence(own) => Some((own, t.at_sensors.0, gained + t.at_sensors.0)),
-            Claim::Mechanism(..) => None,
-        });
-        let told = |(own, gain, of): (&Dependence, f64, f64)| Unexplained {
+        let left = self.decision.left.iter();
+        let left = left.map(|left| (&left.dependence, left.gain, left.share));
+        let told = |(own, gain, share): (&Dependence, f64, f64)| Unexplained {
             balance: own.balance.as_str(),
             variable: own.variable.word(&self.data),
             form: String::new(),
             z: finite_or_zero((2.0 * gain.max(0.0)).sqrt()),
-            share: (gain / of).clamp(0.0, 1.0),
+            share: share.clamp(0.0, 1.0),
         };
         let chosen = self.decision.chosen.extra.iter().map(|own| {
             let gain = self
@@ -111,7 +109,7 @@ impl Answer<'_> {
                     _ => None,
                 })
                 .unwrap_or(0.0);
-            (own, gain, gained)
+            (own, gain, gain / gained)
         });
         chosen.chain(left).map(told).collect()
     }
