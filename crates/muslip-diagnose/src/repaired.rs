@@ -353,16 +353,9 @@ impl Repaired {
     /// # Errors
     /// [`RepairedError`] where the file names what this program does not know.
     pub fn tyre_model(&self, catalogue: &Catalogue, which: Which) -> Result<Model, RepairedError> {
-        let base = match which {
-            Which::Base => &self.base_alone,
-            Which::Repaired => &self.base,
-        };
-        if base.len() != crate::model::TYRE_BASE || base.iter().any(|v| !v.is_finite()) {
-            return Err(RepairedError::BadValue("base".to_owned()));
-        }
         match which {
-            Which::Base => self.model_of(catalogue, base, &[]),
-            Which::Repaired => self.model_of(catalogue, base, &self.tyre),
+            Which::Base => self.model_of(catalogue, law("base", &self.base_alone)?, &[]),
+            Which::Repaired => self.model_of(catalogue, law("base", &self.base)?, &self.tyre),
         }
     }
 
@@ -373,16 +366,15 @@ impl Repaired {
         run: &Run,
         which: Which,
     ) -> Result<Model, RepairedError> {
-        let mut model = self.tyre_model(catalogue, which)?;
+        let model = self.tyre_model(catalogue, which)?;
         let unplaced = &self.base_unplaced;
-        if which == Which::Repaired && !unplaced.is_empty() && self.known(run).is_none() {
-            if unplaced.len() != model.base.len() || unplaced.iter().any(|v| !v.is_finite()) {
-                return Err(RepairedError::BadValue("base_unplaced".to_owned()));
-            }
-            model.base.clone_from(unplaced);
-            model = model.without_order(catalogue, &self.context);
+        if which == Which::Base || unplaced.is_empty() || self.known(run).is_some() {
+            return Ok(model);
         }
-        Ok(model)
+        Ok(Model {
+            base: law("base_unplaced", unplaced)?.to_vec(),
+            ..model.without_order(catalogue, &self.context)
+        })
     }
 
     /// The models of wheel and vehicle in the engine's own form.
@@ -481,6 +473,15 @@ impl Repaired {
                 .map(|f| if f.is_finite() { *f } else { 0.0 })
                 .collect(),
         })
+    }
+}
+
+/// The parameters of a law as the file has them under this key.
+fn law<'a>(key: &str, base: &'a [f64]) -> Result<&'a [f64], RepairedError> {
+    if base.len() == crate::model::TYRE_BASE && base.iter().all(|v| v.is_finite()) {
+        Ok(base)
+    } else {
+        Err(RepairedError::BadValue(key.to_owned()))
     }
 }
 

@@ -67,29 +67,20 @@ impl Left {
 type Named = (Id, f64);
 
 /// Whether a trial is of an alias of what was named, and so small beside it that it is what that name's form leaves.
-fn left_by_form(data: &Data, trial: &Trial, named: &[Named]) -> bool {
-    let Some((id, entry)) = trial.mechanism() else {
+fn left_by_form(trial: &Trial, named: &[Named]) -> bool {
+    let Some((id, _)) = trial.mechanism() else {
         return false;
     };
-    let aliases_of = |id: Id| {
-        let entries = data
-            .catalogue
-            .entries()
-            .iter()
-            .filter(move |m| m.id() == id);
-        entries.flat_map(|m| m.guide().aliases.iter().map(|a| a.with))
-    };
-    let own = data.catalogue.get(entry).guide().aliases;
     named.iter().any(|&(other, weight)| {
-        let alias = own.iter().any(|a| a.with == other) || aliases_of(other).any(|with| with == id);
-        alias && trial.weight() < FORM_LEFT * weight
+        let small = trial.weight() < FORM_LEFT * weight;
+        small && other.aliases().iter().any(|alias| alias.with == id)
     })
 }
 
 /// The trial that is taken up: a mechanism, unless a free dependence accounts for much more in the same balance. One
 /// in another balance is no other account of it, and has its turn later.
 fn taken_up<'a>(data: &Data, trials: &'a [Trial], named: &[Named]) -> Option<&'a Trial> {
-    let own = |t: &&Trial| stands(t) && !left_by_form(data, t, named);
+    let own = |t: &&Trial| stands(t) && !left_by_form(t, named);
     let standing = || trials.iter().filter(own);
     let Some(named) = standing().find(|t| t.mechanism().is_some()) else {
         return standing().next();

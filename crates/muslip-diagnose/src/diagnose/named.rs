@@ -119,12 +119,10 @@ impl Answer<'_> {
         DELAYS
             .iter()
             .filter_map(|&id| {
-                let late = self.delay_of(id)?;
+                let [late, audited] = self.delays_of(id)?;
                 let sure = late.std < VAGUE_DELAY_S && late.value > least_delay(&late);
                 // Fitted with a law that may be wrong it is believed where the audit, which has none, says so too.
-                let told = self
-                    .audited(id)
-                    .is_some_and(|own| own.value > AUDITED * own.std);
+                let told = audited.value > AUDITED * audited.std;
                 (sure && told).then(|| self.delay(id, late.value, late.std))?
             })
             .collect()
@@ -132,20 +130,17 @@ impl Answer<'_> {
 
     /// What the timing says of a delay that is its own to name.
     pub(super) fn delay_of(&self, id: Id) -> Option<Timing> {
-        match id {
-            Id::WheelSpeedDelay => Some(self.timing.against_drag(self.timing.wheel)),
-            Id::VehicleSpeedDelay => Some(self.timing.against_drag(self.timing.vehicle)),
-            _ => None,
-        }
+        self.delays_of(id).map(|[fitted, _]| fitted)
     }
 
-    /// What the audit says of it.
-    fn audited(&self, id: Id) -> Option<Timing> {
-        match id {
-            Id::WheelSpeedDelay => Some(self.audit.wheel_late),
-            Id::VehicleSpeedDelay => Some(self.audit.vehicle_late),
-            _ => None,
-        }
+    /// The same, and what the audit says of it.
+    fn delays_of(&self, id: Id) -> Option<[Timing; 2]> {
+        let (fitted, audited) = match id {
+            Id::WheelSpeedDelay => (self.timing.wheel, self.audit.wheel_late),
+            Id::VehicleSpeedDelay => (self.timing.vehicle, self.audit.vehicle_late),
+            _ => return None,
+        };
+        Some([self.timing.against_drag(fitted), audited])
     }
 
     /// A delay as a mechanism, in that mechanism's own words.
