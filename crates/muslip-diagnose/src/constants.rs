@@ -16,11 +16,16 @@ pub const LEAST_EFFECT: f64 = 0.07;
 /// Least t of the gains on unseen runs: about Student's at five percent, one-sided, for as many runs as campaigns have.
 /// On development campaigns between 1 and 1.5 seventeen standing trials were false and one true.
 pub const LEAST_T: f64 = 2.0;
+/// Least t of a name that all recordings together make clearly likelier than one that stands.
+pub const LEAST_T_OF_LIKELIER: f64 = 1.0;
 /// Where the runs' own differences hide an effect: least gain at the noise that the sensors make plausible, nats. What
 /// measuring chains leave gains less, or unevenly.
 pub const LEAST_GAIN_AT_SENSORS: f64 = 20.0;
 /// As [`LEAST_GAIN_AT_SENSORS`]: least t of the gains' signed roots, which is about twice a plain t.
 pub const LEAST_T_AT_SENSORS: f64 = 4.0;
+/// Nats by which fitted noise may be against what it hides: a likelihood never falls by a term, but for how far the search
+/// for the noise has come.
+pub const INDIFFERENT_NATS: f64 = 10.0;
 
 // Names that gain alike.
 

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use rayon::prelude::*;
 
+use crate::audit::colour::Colour;
 use crate::campaign::{Rig, Run};
 use crate::chain::correct::TimingStd;
 use crate::innovations::blocks::Blocks;
@@ -80,6 +81,12 @@ pub struct Data {
     pub blocks: Vec<[Blocks; 3]>,
     /// Standard deviations in s to which the channels' timing is known.
     pub timing_std: TimingStd,
+    /// By how much the vehicle speed came late against the drag as recorded, in s.
+    pub vehicle_late: f64,
+    /// Slow noise of the vehicle speed, where the audit found one.
+    pub vehicle_colour: Option<Colour>,
+    /// Whether the vehicle speed passes a filter slower than the other channels'.
+    pub vehicle_filtered: bool,
     /// All mechanisms.
     pub catalogue: Arc<Catalogue>,
 }
@@ -186,6 +193,9 @@ impl Data {
             averaged: 1,
             blocks: Vec::new(),
             timing_std: TimingStd::default(),
+            vehicle_late: 0.0,
+            vehicle_colour: None,
+            vehicle_filtered: false,
             catalogue: Arc::default(),
         }
     }

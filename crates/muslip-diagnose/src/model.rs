@@ -84,13 +84,14 @@ fn split<'a, T>(model: &'a Model, p: &'a [T]) -> impl Iterator<Item = (usize, &'
     })
 }
 
-/// Runs the tyre model on one recording up to the reading; `state.contact` is the force in the contact.
-pub fn tyre<T: Listed>(
+/// Runs the tyre model on one recording up to the friction, at the slip and so much beyond it.
+pub fn friction<T: Listed>(
     catalogue: &Catalogue,
     model: &Model,
     p: &[T],
     series: &Series,
     context: &Context,
+    beyond: f64,
 ) -> State<T> {
     let n = series.len();
     let [
@@ -144,7 +145,7 @@ pub fn tyre<T: Listed>(
         .map(|k| {
             if series.rolling[k] {
                 let radius = state.radius.as_ref().map_or(nominal_radius, |r| r[k]);
-                -(radius * state.omega[k] / state.speed[k]) + 1.0
+                -(radius * state.omega[k] / state.speed[k]) + (1.0 + beyond)
             } else {
                 zero
             }
@@ -167,6 +168,28 @@ pub fn tyre<T: Listed>(
         })
         .collect();
     run(Stage::Friction, &mut state);
+    state
+}
+
+/// Runs the tyre model on one recording up to the reading; `state.contact` is the force in the contact.
+pub fn tyre<T: Listed>(
+    catalogue: &Catalogue,
+    model: &Model,
+    p: &[T],
+    series: &Series,
+    context: &Context,
+) -> State<T> {
+    let n = series.len();
+    let mut state = friction(catalogue, model, p, series, context, 0.0);
+    let terms: Vec<(usize, &[T])> = split(model, p).collect();
+    let run = |stage: Stage, state: &mut State<T>| {
+        for (entry, own) in &terms {
+            let mechanism = T::entry(catalogue, *entry);
+            if mechanism.stage() == stage {
+                mechanism.apply(own, series, context, state);
+            }
+        }
+    };
     state.force = (0..n).map(|k| state.friction[k] * state.load[k]).collect();
     // What remembers acts on what the readings say, not on what the drag, noise and all, says of them.
     for (force, beside) in state.force.iter_mut().zip(&series.beside_law) {

@@ -409,6 +409,9 @@ impl Repaired {
             averaged: 1,
             blocks: Vec::new(),
             timing_std: Default::default(),
+            vehicle_late: 0.0,
+            vehicle_colour: None,
+            vehicle_filtered: false,
             catalogue: Arc::default(),
         }
     }

@@ -36,15 +36,25 @@ pub fn coloured(residual: &[Vec<f64>], step: f64) -> Option<(f64, f64)> {
         .then(|| (variance.min(whole).sqrt(), time))
 }
 
-/// The vehicle speed's coloured noise as a finding.
+/// Noise that forgets exponentially.
+#[derive(Clone, Copy, Debug)]
+pub struct Colour {
+    /// Standard deviation, in the channel's unit.
+    pub std: f64,
+    /// Time constant in s.
+    pub time: f64,
+}
+
+/// The vehicle speed's coloured noise, and what is said of it.
 #[must_use]
-pub fn of_vehicle(residual: &[Vec<f64>], step: f64, white: f64) -> Option<Finding> {
+pub fn of_vehicle(residual: &[Vec<f64>], step: f64, white: f64) -> Option<(Finding, Colour)> {
     let (std, time) = coloured(residual, step)?;
     let blocks = residual.iter().map(|b| b.len() as f64 * step).sum::<f64>() / time;
     (std > white && blocks > 40.0).then(|| {
-        Finding::of("vehicle_speed_m_s", Word::ColouredNoise, (std, std / (0.5 * blocks).sqrt()), "m/s").saying(format!(
+        let finding = Finding::of("vehicle_speed_m_s", Word::ColouredNoise, (std, std / (0.5 * blocks).sqrt()), "m/s").saying(format!(
             "The noise of the vehicle speed has a slow part of {std:.4} m/s with a time constant of {time:.2} s."
-        ))
+        ));
+        (finding, Colour { std, time })
     })
 }
 
@@ -86,7 +96,7 @@ fn lasting(memory: Memory) -> Option<Memory> {
 
 /// Slow noise of a vehicle speed that a rig holds: whatever of it does not run straight.
 #[must_use]
-pub fn of_held(runs: &[Recording]) -> Option<Finding> {
+pub fn of_held(runs: &[Recording]) -> Option<(Finding, Colour)> {
     let mut steps: Vec<f64> = runs.iter().map(|run| run.step).collect();
     let step = SPEED_STEP_S.max(median_in_place(&mut steps));
     let mut pairs = Vec::new();
@@ -107,12 +117,12 @@ pub fn of_held(runs: &[Recording]) -> Option<Finding> {
         }
     }
     let memory = lasting(structure(&pairs, step, (SHORTEST_LAG, OWN_LAG_S)).memory(true)?)?;
-    Some(sentence(
-        "vehicle_speed_m_s",
-        "vehicle speed",
-        "m/s",
-        &memory,
-    ))
+    let colour = Colour {
+        std: memory.size().0,
+        time: memory.time,
+    };
+    let finding = sentence("vehicle_speed_m_s", "vehicle speed", "m/s", &memory);
+    Some((finding, colour))
 }
 
 /// Slow noise of the drag: what it leaves beside the law and beside the wheel's balance alike; where no brake is known, what it

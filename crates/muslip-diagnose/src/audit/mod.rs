@@ -39,6 +39,7 @@ pub use finding::{Finding, Timing, Word};
 
 use crate::campaign::{Rig, Run};
 use crate::smooth::{difference_sigma, median_in_place};
+use colour::Colour;
 use recording::{Recording, recording};
 use timing::{Timings, timings};
 
@@ -53,12 +54,23 @@ pub struct Audit {
     pub brake_late: Timing,
     /// The delays in detail.
     pub timings: Timings,
+    /// Slow noise of the vehicle speed.
+    pub vehicle_colour: Option<Colour>,
     /// Entries of `chain`.
     pub findings: Vec<Finding>,
 }
 
+impl Audit {
+    /// Whether the vehicle speed passes a filter slower than the other channels'.
+    #[must_use]
+    pub fn vehicle_filtered(&self) -> bool {
+        let mut findings = self.findings.iter();
+        findings.any(|f| f.finding == Word::LowPassed && f.channel == "vehicle_speed_m_s")
+    }
+}
+
 /// Slow noise of the vehicle speed, where its balance shows it.
-fn slow_noise(timings: &Timings, recordings: &[Recording]) -> Option<Finding> {
+fn slow_noise(timings: &Timings, recordings: &[Recording]) -> Option<(Finding, Colour)> {
     if recordings.iter().any(|run| run.speed.hold.is_some()) {
         return None;
     }
@@ -70,17 +82,23 @@ fn slow_noise(timings: &Timings, recordings: &[Recording]) -> Option<Finding> {
     colour::of_vehicle(&left.residual, left.step, median_in_place(&mut white))
 }
 
-/// What the speeds err by, together or the vehicle's alone.
-fn of_speeds(rig: &Rig, timings: &Timings, recordings: &[Recording]) -> Option<Finding> {
-    common::common(rig, recordings).or_else(|| {
-        if rig.coasting {
-            slow_noise(timings, recordings)
-        } else if recordings.iter().any(|run| run.speed.hold.is_some()) {
-            None
-        } else {
-            colour::of_held(recordings)
-        }
-    })
+/// What the speeds err by, together or the vehicle's alone, and that one's colour.
+fn of_speeds(
+    rig: &Rig,
+    timings: &Timings,
+    recordings: &[Recording],
+) -> (Option<Finding>, Option<Colour>) {
+    if let Some(finding) = common::common(rig, recordings) {
+        return (Some(finding), None);
+    }
+    let found = if rig.coasting {
+        slow_noise(timings, recordings)
+    } else if recordings.iter().any(|run| run.speed.hold.is_some()) {
+        None
+    } else {
+        colour::of_held(recordings)
+    };
+    found.unzip()
 }
 
 /// Step of the grid for the drag's slow noise, s.
@@ -146,13 +164,15 @@ pub fn audit(rig: &Rig, runs: &[Run]) -> Audit {
     findings.extend(line::hum(&recordings));
     findings.extend(leak::leaks(runs));
     findings.extend(filter::filters(&timings, &recordings));
-    findings.extend(of_speeds(rig, &timings, &recordings));
+    let (of_speeds, vehicle_colour) = of_speeds(rig, &timings, &recordings);
+    findings.extend(of_speeds);
     let more = of_tyre(rig, &timings, &recordings, &findings);
     findings.extend(more);
     Audit {
         wheel_late: timings.wheel,
         vehicle_late: timings.vehicle,
         brake_late: timings.brake,
+        vehicle_colour,
         findings,
         timings,
     }

@@ -143,6 +143,9 @@ fn at_one_time(
     split.take_out(&mut data.series);
     data.blocks = blocks(&data);
     data.timing_std = known_to(audit);
+    data.vehicle_late = late.vehicle;
+    data.vehicle_colour = audit.vehicle_colour;
+    data.vehicle_filtered = audit.vehicle_filtered();
     data
 }
 

@@ -193,7 +193,7 @@ impl<'a> Screen<'a> {
         excluded: &[Id],
         chain_s: f64,
     ) -> Self {
-        let slopes = Slopes::new(data, &so_far.model.base);
+        let slopes = Slopes::new(data, &so_far.model);
         let taken = |id: Id| {
             let entry = |t: &Term| data.catalogue.get(t.entry).id() == id;
             excluded.contains(&id) || so_far.model.terms.iter().any(entry)

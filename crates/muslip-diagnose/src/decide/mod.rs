@@ -7,7 +7,7 @@ mod trial;
 use finalists::{Screen, effort};
 use rank::rank;
 pub use rank::softness;
-use trial::{Before, left_open};
+use trial::{Before, could_stand, left_open};
 pub use trial::{Claim, Trial, stands, through_force};
 
 use crate::constants::{ALIKE_NATS, DEPENDENCE_NATS, DEPENDENCE_SHARE, FORM_LEFT};
@@ -20,6 +20,9 @@ use crate::model::Model;
 
 /// Most names.
 const MOST_NAMES: usize = 3;
+
+/// How often the noise of a model is fitted anew before others are tried beside it.
+const MOST_SETTLING: usize = 5;
 
 /// What was decided.
 pub struct Decision {
@@ -79,12 +82,21 @@ fn left_by_form(trial: &Trial, named: &[Named]) -> bool {
 
 /// The trial that is taken up: a mechanism, unless a free dependence accounts for much more in the same balance. One
 /// in another balance is no other account of it, and has its turn later.
-fn taken_up<'a>(data: &Data, trials: &'a [Trial], named: &[Named]) -> Option<&'a Trial> {
-    let own = |t: &&Trial| stands(t) && !left_by_form(t, named);
+fn taken_up<'a>(data: &Data, trials: &'a [Trial], before: &[Named]) -> Option<&'a Trial> {
+    let own = |t: &&Trial| stands(t) && !left_by_form(t, before);
     let standing = || trials.iter().filter(own);
     let Some(named) = standing().find(|t| t.mechanism().is_some()) else {
         return standing().next();
     };
+    // That something is there is shown by what stands; what it is, by what all recordings together say.
+    let likelier = |t: &&Trial| {
+        let of_same = t.claim.balance(data) == named.claim.balance(data);
+        t.mechanism().is_some() && of_same && could_stand(t) && !left_by_form(t, before)
+    };
+    let named = trials.iter().find(likelier).map_or(named, |likeliest| {
+        let apart = likeliest.weight() - named.weight() > softness(likeliest.weight());
+        if apart { likeliest } else { named }
+    });
     let instead = |t: &&Trial| {
         let of_same = t.claim.balance(data) == named.claim.balance(data);
         of_same && t.weight() > DEPENDENCE_SHARE * named.weight() + DEPENDENCE_NATS
@@ -93,23 +105,23 @@ fn taken_up<'a>(data: &Data, trials: &'a [Trial], named: &[Named]) -> Option<&'a
     Some(free.find(instead).unwrap_or(named))
 }
 
-/// Decides what is named beside the base model; `chain_s` is what the chain's own timing was off by, in s.
-#[must_use]
-pub fn decide(data: &Data, mut base: Judged, excluded: &[Id], chain_s: f64) -> Decision {
-    let mut chosen = base.clone();
-    let mut rounds = Vec::new();
-    let mut seen = None;
-    let mut named: Vec<Named> = Vec::new();
-    let mut left = None;
-    let mut taken_up_gains = 0.0;
-    let free = dependence::all(data);
-    while chosen.model.terms.len() + chosen.extra.len() < MOST_NAMES {
-        let screen = Screen::new(data, &chosen, &free, excluded, chain_s);
-        seen.get_or_insert_with(|| screen.seen());
+/// What every round is held with.
+struct Question<'a> {
+    data: &'a Data,
+    free: Vec<Dependence>,
+    excluded: &'a [Id],
+    chain_s: f64,
+}
+
+impl Question<'_> {
+    /// One round beside a model: all trials, best first, and how large each mechanism would have to be to be seen.
+    fn round(&self, so_far: &Judged, named: &[Named]) -> (Vec<Trial>, Vec<Seen>) {
+        let data = self.data;
+        let screen = Screen::new(data, so_far, &self.free, self.excluded, self.chain_s);
         let mut trials = screen.trials();
         // What only the chain remembers has taken the place of other names.
         let of_chain = trials.iter().any(|t| !t.outlasts_chain);
-        if of_chain && taken_up(data, &trials, &named).is_none() {
+        if of_chain && taken_up(data, &trials, named).is_none() {
             let tried: Vec<Id> = trials
                 .iter()
                 .filter_map(|t| Some(t.mechanism()?.0))
@@ -117,30 +129,47 @@ pub fn decide(data: &Data, mut base: Judged, excluded: &[Id], chain_s: f64) -> D
             trials.extend(screen.trials_without(&tried));
             rank(data, &mut trials);
         }
-        let mut next = taken_up(data, &trials, &named).cloned();
-        if let Some(better) = next.as_ref().and_then(|t| at_noise_of(data, &chosen, t)) {
-            for trial in &mut trials {
-                trial.set_against(data, &chosen, &better);
-            }
-            rank(data, &mut trials);
-            if rounds.is_empty() {
-                base = better.clone();
-            }
+        (trials, screen.seen())
+    }
+}
+
+/// Decides what is named beside the base model; `chain_s` is what the chain's own timing was off by, in s.
+#[must_use]
+pub fn decide(data: &Data, base: Judged, excluded: &[Id], chain_s: f64) -> Decision {
+    let question = Question {
+        data,
+        free: dependence::all(data),
+        excluded,
+        chain_s,
+    };
+    let mut base = settled(data, base);
+    let mut chosen = base.clone();
+    let mut rounds = Vec::new();
+    let mut seen = Vec::new();
+    let mut named: Vec<Named> = Vec::new();
+    let mut left = None;
+    let mut taken_up_gains = 0.0;
+    while chosen.model.terms.len() + chosen.extra.len() < MOST_NAMES {
+        let (mut trials, mut sizes) = question.round(&chosen, &named);
+        let best = taken_up(data, &trials, &named);
+        // A trial that came upon better sizes of the noise gains nothing by them, and no other loses.
+        if let Some(better) = best.and_then(|t| at_noise_of(data, &chosen, t)) {
             chosen = better;
-            next = taken_up(data, &trials, &named).cloned();
+            (trials, sizes) = question.round(&chosen, &named);
         }
+        if rounds.is_empty() {
+            base = chosen.clone();
+            seen = sizes;
+        }
+        let next = taken_up(data, &trials, &named).cloned();
         if next.is_none() {
             left = Left::of(&trials, taken_up_gains);
         }
         rounds.push(trials);
-        match next {
-            Some(trial) => {
-                taken_up_gains += trial.at_sensors.0.max(0.0);
-                named.extend(trial.mechanism().map(|(id, _)| (id, trial.weight())));
-                chosen = trial.judged;
-            }
-            None => break,
-        }
+        let Some(trial) = next else { break };
+        taken_up_gains += trial.at_sensors.0.max(0.0);
+        named.extend(trial.mechanism().map(|(id, _)| (id, trial.weight())));
+        chosen = settled(data, trial.judged);
     }
     if chosen.model.terms.len() > 1 {
         chosen = without_idle(data, chosen, chain_s);
@@ -150,8 +179,26 @@ pub fn decide(data: &Data, mut base: Judged, excluded: &[Id], chain_s: f64) -> D
         chosen,
         rounds,
         left,
-        seen: seen.unwrap_or_default(),
+        seen,
     }
+}
+
+/// A model whose noise is fitted until it stays: what it is short of its best would count for what is tried beside it.
+fn settled(data: &Data, mut judged: Judged) -> Judged {
+    for _ in 0..MOST_SETTLING {
+        let guess = Some(Guess::of(&judged.parts));
+        let Some(next) = judge(data, &judged.model, &judged.extra, guess, effort(data)) else {
+            break;
+        };
+        let gained = judged.loss - next.loss;
+        if gained > 0.0 {
+            judged = next;
+        }
+        if gained < ALIKE_NATS {
+            break;
+        }
+    }
+    judged
 }
 
 /// The model so far under noise like a trial's, where that is better: sizes of the noise that only the trial came
@@ -180,26 +227,26 @@ fn without_idle(data: &Data, mut chosen: Judged, chain_s: f64) -> Judged {
             None => return chosen,
         }
     }
-    let mut at = 0;
     let mut dropped = false;
-    while names.model.terms.len() > 1 && at < names.model.terms.len() {
-        let mut model = names.model.clone();
-        let term = model.terms.remove(at);
-        let claim = Claim::Mechanism(data.catalogue.get(term.entry).id(), term.entry);
-        // It was large enough when it was taken up: what counts is whether the others leave anything to it.
-        let idle = judged(&model, &[], &names).filter(|without| {
+    while names.model.terms.len() > 1 {
+        let idle = (0..names.model.terms.len()).filter_map(|at| {
+            let mut model = names.model.clone();
+            let term = model.terms.remove(at);
+            let claim = Claim::Mechanism(data.catalogue.get(term.entry).id(), term.entry);
+            let without = judged(&model, &[], &names)?;
+            // It was large enough when it was taken up: what counts is whether the others leave anything to it.
             let size = f64::INFINITY;
-            let mut trial = Before::new(data, without, chain_s).tried(claim, names.clone(), size);
+            let mut trial = Before::new(data, &without, chain_s).tried(claim, names.clone(), size);
             trial.first = true;
-            !stands(&trial)
+            let needed = stands(&trial) || could_stand(&trial);
+            (!needed).then(|| (trial.weight(), without))
         });
-        match idle {
-            Some(without) => {
-                names = without;
-                dropped = true;
-            }
-            None => at += 1,
-        }
+        // The least of them goes, and the others are asked again.
+        let Some((_, without)) = idle.min_by(|a, b| a.0.total_cmp(&b.0)) else {
+            break;
+        };
+        names = without;
+        dropped = true;
     }
     if dropped {
         chosen = judged(&names.model, &chosen.extra, &names).unwrap_or(names);

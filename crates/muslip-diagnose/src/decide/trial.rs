@@ -1,11 +1,11 @@
 //! What a claim gains beside the model so far, and whether it stands.
 
 use crate::constants::{
-    DEPENDENCE_WORTH, LEAST_EFFECT, LEAST_GAIN, LEAST_GAIN_AT_SENSORS,
+    DEPENDENCE_WORTH, INDIFFERENT_NATS, LEAST_EFFECT, LEAST_GAIN, LEAST_GAIN_AT_SENSORS,
     LEAST_GAIN_OF_DEPENDENCE_AT_SENSORS, LEAST_MEMORY_S, LEAST_PREDICTED,
     LEAST_PREDICTED_BY_DEPENDENCE, LEAST_T, LEAST_T_AT_SENSORS, LEAST_T_OF_DEPENDENCE,
-    LEAST_T_OF_DEPENDENCE_AT_SENSORS, PRICE_OF_NAME, PRICE_OF_PARAMETER, REAL_MEMORY_PREDICTED,
-    REAL_MEMORY_T, RINGING,
+    LEAST_T_OF_DEPENDENCE_AT_SENSORS, LEAST_T_OF_LIKELIER, PRICE_OF_NAME, PRICE_OF_PARAMETER,
+    REAL_MEMORY_PREDICTED, REAL_MEMORY_T, RINGING,
 };
 use crate::data::Data;
 use crate::innovations::dependence::Dependence;
@@ -57,6 +57,8 @@ pub struct Trial {
     pub claim: Claim,
     /// Gain in nats, prices taken off.
     pub gain: f64,
+    /// Prices taken off the gain in nats.
+    pub price: f64,
     /// Mean gain on unseen runs in nats, and its t over the runs.
     pub unseen: (f64, f64),
     /// Gain on all unseen runs in nats if the noise were no larger than the sensors make plausible, and the t of the
@@ -89,10 +91,12 @@ impl Trial {
         }
     }
 
-    /// How much speaks for it at both levels of the noise: the geometric mean of its gains.
+    /// How much speaks for it at both levels of the noise: the geometric mean of its gains. Fitted noise that is
+    /// indifferent to what it hides counts for one nat.
     #[must_use]
     pub fn weight(&self) -> f64 {
-        (self.gain.max(0.0) * self.at_sensors.0.max(0.0)).sqrt()
+        let least = if hidden(self) { 1.0 } else { 0.0 };
+        (self.gain.max(least) * self.at_sensors.0.max(0.0)).sqrt()
     }
 
     /// How alike the runs speak for it: the larger t of the two levels, one of signed roots being about twice the plain
@@ -100,17 +104,6 @@ impl Trial {
     #[must_use]
     pub fn steadiness(&self) -> f64 {
         self.unseen.1.max(0.5 * self.at_sensors.1)
-    }
-
-    /// Sets it against another state of the model without it.
-    pub fn set_against(&mut self, data: &Data, before: &Judged, base: &Judged) {
-        self.gain -= before.loss - base.loss;
-        let own = gains(
-            &base.unseen,
-            &self.judged.unseen,
-            self.claim.is_per_run(data),
-        );
-        self.unseen = mean_and_t(&own);
     }
 }
 
@@ -208,9 +201,11 @@ impl<'a> Before<'a> {
             }
             Claim::Dependence(_) => true,
         };
+        let price = PRICE_OF_PARAMETER * free + PRICE_OF_NAME;
         Trial {
             claim,
-            gain: base.loss - judged.loss - PRICE_OF_PARAMETER * free - PRICE_OF_NAME,
+            gain: base.loss - judged.loss - price,
+            price,
             unseen: mean_and_t(&gains(&base.unseen, &judged.unseen, per_run)),
             at_sensors,
             first,
@@ -293,20 +288,42 @@ fn memory_s(data: &Data, id: Id, entry: usize, model: &Model) -> Option<f64> {
     }
 }
 
+/// Gain of the least effect that is worth a name, nats.
+fn worth(trial: &Trial) -> f64 {
+    0.5 * LEAST_EFFECT * LEAST_EFFECT * trial.readings as f64
+}
+
+/// Whether a trial could be named, were it seen: large enough, no memory of the chain's, and better at predicting.
+fn could_be_named(trial: &Trial) -> bool {
+    trial.size > worth(trial) && trial.outlasts_chain && trial.predicts > LEAST_PREDICTED
+}
+
 /// Whether a trial stands.
 #[must_use]
 pub fn stands(trial: &Trial) -> bool {
-    let worth = 0.5 * LEAST_EFFECT * LEAST_EFFECT * trial.readings as f64;
-    let worth_it = trial.size > worth;
     let least_gain = if trial.mechanism().is_some() {
         LEAST_GAIN
     } else {
-        DEPENDENCE_WORTH * worth
+        DEPENDENCE_WORTH * worth(trial)
     };
     let seen = trial.gain > least_gain && seen_on_unseen_runs(trial);
-    let hidden = trial.first && trial.gain > 0.0 && seen_at_sensors(trial);
-    let predicts = trial.predicts > LEAST_PREDICTED;
-    (seen || hidden) && worth_it && trial.outlasts_chain && predicts
+    (seen || hidden(trial)) && could_be_named(trial)
+}
+
+/// Whether the runs' own differences hide what all runs show at the sensors' noise: then the fitted noise, which may be
+/// theirs, is indifferent.
+fn hidden(trial: &Trial) -> bool {
+    let indifferent = trial.gain > -trial.price - INDIFFERENT_NATS;
+    let gains = trial.gain > 0.0 || (indifferent && trial.mechanism().is_some());
+    trial.first && gains && seen_at_sensors(trial)
+}
+
+/// Whether a trial is as good as one that stands but for how alike unseen runs speak for it.
+#[must_use]
+pub fn could_stand(trial: &Trial) -> bool {
+    let (mean, t) = trial.unseen;
+    let gains = trial.gain > LEAST_GAIN && mean > 0.0 && t > LEAST_T_OF_LIKELIER;
+    gains && could_be_named(trial)
 }
 
 /// Whether unseen runs gain, and alike, where their own differences are no larger than sensors make plausible.

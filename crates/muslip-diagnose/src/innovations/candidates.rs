@@ -101,6 +101,54 @@ fn second(rate: &[f64], time: &[f64]) -> Vec<f64> {
         .collect()
 }
 
+/// Shortest lateness of a vehicle speed in s of which the shape matters: poles or a mere delay.
+const LEAST_POLE_S: f64 = 5e-3;
+
+/// What an impulse gains where a channel is late by so many equal poles and was taken to be late by a delay, in N s:
+/// the force through the poles, brought forward by their delay, less the force, over time.
+fn poles_for_delay(time: &[f64], dt: &[f64], force: &[f64], late: f64, poles: usize) -> Vec<f64> {
+    let mut passed = force.to_vec();
+    for _ in 0..poles {
+        let mut out = passed.first().copied().unwrap_or(0.0);
+        for (x, dt) in passed.iter_mut().zip(dt) {
+            out += (1.0 - (-dt * poles as f64 / late).exp()) * (*x - out);
+            *x = out;
+        }
+    }
+    let early = at_times(time, &passed, late);
+    let mut sum = 0.0;
+    early
+        .iter()
+        .zip(force)
+        .zip(dt)
+        .map(|((early, force), dt)| {
+            sum += (early - force) * dt.min(0.1);
+            sum
+        })
+        .collect()
+}
+
+/// A column at so many s after each sample, the last value beyond its end.
+fn at_times(time: &[f64], x: &[f64], after: f64) -> Vec<f64> {
+    let last = time.len().saturating_sub(1);
+    let mut at = 0;
+    time.iter()
+        .map(|t| {
+            while at < last && time[at + 1] < t + after {
+                at += 1;
+            }
+            let next = (at + 1).min(last);
+            let span = time[next] - time[at];
+            let share = if span > 0.0 {
+                ((t + after - time[at]) / span).clamp(0.0, 1.0)
+            } else {
+                0.0
+            };
+            x[at] + share * (x[next] - x[at])
+        })
+        .collect()
+}
+
 /// Columns of the measuring chain's nuisances on one run, with the prior standard deviations of their coefficients.
 fn nuisances(data: &Data, slopes: &Slopes, run: usize) -> Vec<(f64, Triple)> {
     let s = &data.series[run];
@@ -207,6 +255,21 @@ fn nuisances(data: &Data, slopes: &Slopes, run: usize) -> Vec<(f64, Triple)> {
             column(Balance::Vehicle, &|k| if brake { 0.0 } else { level[k] }),
         ]
     };
+    let by_poles = |poles: usize| -> Triple {
+        let late = data.vehicle_late;
+        let level = if late > LEAST_POLE_S && !s.vehicle_balance.is_empty() {
+            let force = quiet_force(s, &slopes.force[run]);
+            let force: Vec<f64> = force.into_iter().map(finite_or_zero).collect();
+            poles_for_delay(&s.time, &s.dt, &force, late, poles)
+        } else {
+            vec![0.0; n]
+        };
+        [
+            column(Balance::Tyre, &|_| 0.0),
+            column(Balance::Wheel, &|_| 0.0),
+            column(Balance::Vehicle, &|k| level[k]),
+        ]
+    };
     let torque = |k: usize| s.torque.as_ref().map_or(0.0, |t| t.smooth[k]);
     vec![
         // Wheel speed late.
@@ -245,6 +308,9 @@ fn nuisances(data: &Data, slopes: &Slopes, run: usize) -> Vec<(f64, Triple)> {
         (1e-4, by_motion()),
         // Vehicle speed low-passed.
         (3e-3, by_speed(&|k| -0.5 * speed_second[k])),
+        // Vehicle speed late by one pole, by two, instead of by a delay.
+        (1.0, by_poles(1)),
+        (1.0, by_poles(2)),
         // Wheel speed low-passed.
         (3e-4, by_wheel(&|k| -0.5 * wheel_second[k])),
     ]
@@ -415,4 +481,34 @@ fn column_of(
         .map(|run| free.iter().map(|i| run[*i].clone()).collect())
         .collect();
     Some((free, kept))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_step_through_a_pole_ahead_of_its_delay_leaves_what_has_not_passed_yet() {
+        let (step, late, size) = (1e-4, 0.05, 300.0);
+        let time: Vec<f64> = (0..4000).map(|k| f64::from(k) * step).collect();
+        let dt = vec![step; time.len()];
+        let from = 0.1;
+        let force: Vec<f64> = time
+            .iter()
+            .map(|t| if *t >= from { size } else { 0.0 })
+            .collect();
+        let found = poles_for_delay(&time, &dt, &force, late, 1);
+        // From the step on: size late exp(-(t - from + late) / late).
+        for k in [1000, 1300, 2000, 3000] {
+            let expected = size * late * (-(time[k] - from + late) / late).exp();
+            assert!(
+                (found[k] - expected).abs() < 0.01 * size * late,
+                "{k}: {} {expected}",
+                found[k]
+            );
+        }
+        // Whatever the number of poles, in the end all of the impulse has passed.
+        let two = poles_for_delay(&time, &dt, &force, late, 2);
+        assert!(two[3400].abs() < 0.01 * size * late, "{}", two[3400]);
+    }
 }

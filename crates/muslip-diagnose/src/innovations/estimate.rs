@@ -34,6 +34,8 @@ pub struct Readings<'a> {
     pub columns: &'a [Columns],
     /// Prior precision by column.
     pub precision: &'a dyn Fn(usize) -> f64,
+    /// Inner products of the same columns in all other balances, which share the coefficients.
+    pub others: &'a DMatrix<f64>,
     /// Every so many samples.
     pub stride: usize,
 }
@@ -83,6 +85,7 @@ fn loss(readings: &Readings<'_>, parts: &BalanceParts, below: f64) -> Result<Los
         data,
         columns,
         precision,
+        others,
         stride,
     } = *readings;
     let q = columns.iter().map(Vec::len).max().unwrap_or(0);
@@ -102,7 +105,7 @@ fn loss(readings: &Readings<'_>, parts: &BalanceParts, below: f64) -> Result<Los
             )
         })
         .collect();
-    let mut sum = DMatrix::zeros(q, q);
+    let mut sum = others.clone();
     let mut log_variance = 0.0;
     for (_, f) in &filtered {
         sum += products(q, &f.which, &f.white, 0, f.whitener.samples.len());

@@ -1,7 +1,7 @@
 //! A model judged with everything that it may claim: its parameters, the chain's nuisances and the noise are fitted
 //! with it, so that two models are compared each at its own best.
 
-use nalgebra::DVector;
+use nalgebra::{DMatrix, DVector};
 
 use super::candidates::{Table, table};
 use super::dependence::{Dependence, width};
@@ -56,7 +56,7 @@ impl Judged {
     /// What it says of unseen runs where this were the noise.
     #[must_use]
     pub fn unseen_under(&self, data: &Data, noise: &[BalanceParts]) -> Option<Unseen> {
-        let slopes = Slopes::new(data, &self.model.base);
+        let slopes = Slopes::new(data, &self.model);
         let table = table_of(data, &self.model, &slopes, &self.extra);
         let grams = table_grams(data, noise, &table);
         unseen(data, &self.model, &table, &grams)
@@ -235,43 +235,24 @@ impl Place {
         extra: &[Dependence],
         sizes: Option<&[BalanceParts]>,
         fitted: Option<Effort>,
-        added: bool,
     ) -> Option<Self> {
-        let slopes = Slopes::new(data, &model.base);
+        let slopes = Slopes::new(data, &model);
         let fresh = parts(data, &slopes);
         let mut noise = match sizes {
             Some(old) => with_sizes(fresh, old),
             None => fresh,
         };
         let table = table_of(data, &model, &slopes, extra);
-        let prior = |i: usize| precision(&table, i);
         if let Some(effort) = fitted {
-            for part in &mut noise {
-                let columns = &table.columns[part.balance as usize];
-                if added && !touches(columns, added_columns(&model, extra)) {
-                    continue;
-                }
-                let readings = Readings {
-                    data,
-                    columns,
-                    precision: &prior,
-                    stride: effort.noise_stride,
-                };
-                fit_from_both(&readings, part, effort.noise_steps, sizes.is_some());
+            for _ in 0..SWEEPS {
+                fit_in_turn(data, &table, &mut noise, &|_| true, false, effort);
             }
         }
-        let mut grams = table_grams(data, &noise, &table);
-        let mut sum = total(&grams);
+        let prior = |i: usize| precision(&table, i);
+        let grams = table_grams(data, &noise, &table);
+        let sum = total(&grams);
         let chosen: Vec<usize> = (1..sum.products.nrows()).collect();
-        let mut solved = solve(&sum.products, &chosen, &prior)?;
-        if let Some(effort) = fitted
-            && at_odds(&sum, &solved)
-        {
-            fit_together(data, &table, &mut noise, &solved, effort);
-            grams = table_grams(data, &noise, &table);
-            sum = total(&grams);
-            solved = solve(&sum.products, &chosen, &prior)?;
-        }
+        let solved = solve(&sum.products, &chosen, &prior)?;
         let here = solve(&sum.products, &linear(&table, &model), &prior)?.rss + sum.log_variance;
         Some(Self {
             model,
@@ -291,20 +272,18 @@ impl Place {
 
     /// The same place with the noise fitted to it.
     fn refitted(
-        self,
+        mut self,
         data: &Data,
         extra: &[Dependence],
         effort: Effort,
         added: bool,
     ) -> Option<Self> {
-        Self::new(
-            data,
-            self.model,
-            extra,
-            Some(&self.noise),
-            Some(effort),
-            added,
-        )
+        let columns = added_columns(&self.model, extra);
+        let touched = |balance: Balance| {
+            !added || touches(&self.table.columns[balance as usize], columns.clone())
+        };
+        fit_in_turn(data, &self.table, &mut self.noise, &touched, true, effort);
+        Self::new(data, self.model, extra, Some(&self.noise), None)
     }
 
     /// At most so many steps towards the best parameters, none uphill.
@@ -316,7 +295,7 @@ impl Place {
                 break;
             }
             let model = place.stepped(data, shrink);
-            let next = Self::new(data, model, extra, Some(&place.noise), None, false)?;
+            let next = Self::new(data, model, extra, Some(&place.noise), None)?;
             if next.here < place.here {
                 place = next;
                 shrink = f64::min(1.0, 2.0 * shrink);
@@ -381,43 +360,46 @@ fn own_parameters(model: &Model) -> Vec<usize> {
     [0, 1].into_iter().chain(TYRE_BASE..n).collect()
 }
 
-/// Share by which the squares that all balances leave together may exceed their number.
-const AT_ODDS: f64 = 1.1;
+/// How often the noise of every balance is fitted in turn where nothing is known of any.
+const SWEEPS: usize = 2;
 
-/// Whether balances, each content with its own timing and bandwidth of the channels, leave too much where they have to
-/// share it.
-fn at_odds(sum: &Gram, solved: &Solved) -> bool {
-    solved.rss > AT_ODDS * sum.count as f64
-}
-
-/// Fits the noise of every balance to what the coefficients that all share leave of it.
-fn fit_together(
+/// Fits the noise of one balance after the other, by the likelihood of all: they share the coefficients. `carried` is
+/// whether it was fitted to another model.
+fn fit_in_turn(
     data: &Data,
     table: &Table,
     noise: &mut [BalanceParts],
-    shared: &Solved,
+    touched: &dyn Fn(Balance) -> bool,
+    carried: bool,
     effort: Effort,
 ) {
-    for part in noise {
-        let mut columns = table.columns[part.balance as usize].clone();
-        for run in &mut columns {
-            let Some((residual, others)) = run.split_first_mut() else {
-                continue;
-            };
-            for (x, c) in others.iter().zip(shared.coefficients.iter()) {
-                for (e, x) in residual.iter_mut().zip(x) {
-                    *e += c * x;
-                }
-            }
+    let prior = |i: usize| precision(table, i);
+    let own = |part: &BalanceParts| {
+        total(&grams(data, part, &table.columns[part.balance as usize], 1)).products
+    };
+    let mut products: Vec<DMatrix<f64>> = noise.iter().map(own).collect();
+    for at in 0..noise.len() {
+        let part = &mut noise[at];
+        if !touched(part.balance) {
+            continue;
         }
-        let known = |i: usize| 1.0 / shared.covariance[(i - 1, i - 1)].max(1e-300);
+        let mut others = DMatrix::zeros(products[at].nrows(), products[at].ncols());
+        for (_, own) in products.iter().enumerate().filter(|(i, _)| *i != at) {
+            others += own;
+        }
         let readings = Readings {
             data,
-            columns: &columns,
-            precision: &known,
+            columns: &table.columns[part.balance as usize],
+            precision: &prior,
+            others: &others,
             stride: effort.noise_stride,
         };
-        estimate::fit(&readings, part, effort.noise_steps);
+        if carried {
+            fit_from_both(&readings, part, effort.noise_steps);
+        } else {
+            estimate::fit(&readings, part, effort.noise_steps);
+        }
+        products[at] = own(part);
     }
 }
 
@@ -449,12 +431,9 @@ fn linear(table: &Table, model: &Model) -> Vec<usize> {
 
 /// Fits the sizes of a balance's noise from what they are and, where they were fitted to another model, from the
 /// sensors' own as well: what swallowed an effect before it was in the model must be let go of.
-fn fit_from_both(readings: &Readings<'_>, part: &mut BalanceParts, steps: usize, carried: bool) {
+fn fit_from_both(readings: &Readings<'_>, part: &mut BalanceParts, steps: usize) {
     let mut anew = part.clone();
     let carried_on = estimate::fit(readings, part, steps);
-    if !carried {
-        return;
-    }
     for source in &mut anew.sources {
         source.log_std = source.log_start;
     }
@@ -504,18 +483,11 @@ pub fn judge(
 ) -> Option<Judged> {
     let first = (guess.is_none()).then_some(effort);
     let added = guess.is_some_and(|g| g.added);
-    Place::new(
-        data,
-        start.clone(),
-        extra,
-        guess.map(|g| g.parts),
-        first,
-        false,
-    )?
-    .descended(data, extra, effort.steps)?
-    .refitted(data, extra, effort, added)?
-    .descended(data, extra, effort.steps.div_ceil(2))?
-    .judged(data, extra)
+    Place::new(data, start.clone(), extra, guess.map(|g| g.parts), first)?
+        .descended(data, extra, effort.steps)?
+        .refitted(data, extra, effort, added)?
+        .descended(data, extra, effort.steps.div_ceil(2))?
+        .judged(data, extra)
 }
 
 /// What a model says of every run and half run that it were not fitted to.
@@ -580,6 +552,57 @@ mod tests {
         let factor = covariance.cholesky().unwrap();
         let log_det: f64 = factor.l_dirty().diagonal().iter().map(|x| x.ln()).sum();
         log_det + 0.5 * residual.dot(&factor.solve(residual))
+    }
+
+    #[test]
+    fn a_likelihood_never_falls_by_a_term_that_may_be_nothing() {
+        use crate::innovations::toy::{CRITICAL, Noise, PEAK, stop};
+        use crate::mechanism::Id;
+        use crate::model::Term;
+        let noise = Noise {
+            wheel: 0.3,
+            drag: 15.0,
+            load: 40.0,
+            torque: 5.0,
+        };
+        let data = stop(noise, 4);
+        let effort = Effort {
+            steps: 8,
+            noise_steps: 20,
+            noise_stride: 1,
+        };
+        let law = Model::of_law(PEAK, CRITICAL);
+        let mut base = judge(&data, &law, &[], None, effort).unwrap();
+        for _ in 0..3 {
+            let guess = Some(Guess::of(&base.parts));
+            base = judge(&data, &base.model, &[], guess, effort).unwrap();
+        }
+        let mut tried = 0;
+        for (entry, mechanism) in data.catalogue.entries().iter().enumerate() {
+            let nothing = match mechanism.id() {
+                Id::WearDrift if mechanism.form() == "energy" => vec![0.0],
+                Id::RollingResistance if mechanism.form() == "constant" => vec![0.0],
+                Id::InertialReaction | Id::WheelInertia => vec![0.0],
+                _ => continue,
+            };
+            let mut model = base.model.clone();
+            model.terms.push(Term {
+                entry,
+                parameters: nothing,
+            });
+            let Some(with) = judge(&data, &model, &[], Some(Guess::beside(&base)), effort) else {
+                continue;
+            };
+            tried += 1;
+            assert!(
+                with.loss < base.loss + 0.5,
+                "{:?}: {} beside {}",
+                mechanism.id(),
+                with.loss,
+                base.loss
+            );
+        }
+        assert!(tried >= 3, "{tried}");
     }
 
     #[test]

@@ -2,14 +2,19 @@
 
 use super::rows::quiet_force;
 use super::whiten::{DIFFUSE, Kind, Part, Whitener};
+use crate::audit::colour::Colour;
 use crate::data::Data;
 use crate::mechanism::Balance;
+use crate::model::{Model, friction};
 use crate::number::finite_or_zero;
 
 /// Memory in s of the wheel speed's noise in the slip: so many of the smoother's windows, within bounds.
 const WINDOWS: f64 = 1.5;
 const SHORTEST_MEMORY_S: f64 = 0.015;
 const LONGEST_MEMORY_S: f64 = 0.1;
+
+/// Memory in s of the vehicle speed's slow noise where the audit knows none.
+const VEHICLE_MEMORY_S: f64 = 0.2;
 
 /// One part of a balance's noise over the campaign.
 #[derive(Clone, Debug)]
@@ -39,7 +44,8 @@ pub struct BalanceParts {
     pub sources: Vec<Source>,
 }
 
-/// How the force on the base curve changes with what is measured, by run and sample.
+/// How the force on the model's curve changes with what is measured, by run and sample: without what remembers and
+/// what the reading adds.
 pub struct Slopes {
     /// N per rad/s of the wheel speed.
     pub wheel: Vec<Vec<f64>>,
@@ -53,11 +59,14 @@ pub struct Slopes {
     pub curvature: Vec<Vec<f64>>,
 }
 
+/// Step of a curve's derivatives, in critical slips.
+const CURVE_STEP: f64 = 1e-3;
+
 impl Slopes {
-    /// On the base curve with these logarithms of its two parameters.
+    /// On the curve of a model, its law with all that its terms make of it.
     #[must_use]
-    pub fn new(data: &Data, base: &[f64]) -> Self {
-        let (peak, critical) = (base[0].exp(), base[1].exp());
+    pub fn new(data: &Data, model: &Model) -> Self {
+        let p = model.vector();
         let radius = data.context.radius;
         let mut out = Self {
             wheel: Vec::new(),
@@ -67,31 +76,24 @@ impl Slopes {
             curvature: Vec::new(),
         };
         for s in &data.series {
+            let step = CURVE_STEP * model.base[1].exp();
+            let [before, here, after] = [-step, 0.0, step].map(|beyond| {
+                friction::<f64>(&data.catalogue, model, &p, s, &data.context, beyond).friction
+            });
             let mut all = [const { Vec::new() }; 5];
             for k in 0..s.len() {
                 let (v, omega, load) = (s.speed.smooth[k], s.wheel.smooth[k], s.load.smooth[k]);
-                let x = s.slip(k, radius) / critical;
-                let shape = 1.0 + x * x;
-                let (force, slope) = if s.rolling[k] {
-                    (
-                        load * 2.0 * peak * x / shape,
-                        load * 2.0 * peak / critical * (1.0 - x * x) / (shape * shape),
-                    )
-                } else {
-                    (0.0, 0.0)
-                };
+                let [mut force, mut slope, mut bend] = [0.0; 3];
+                if s.rolling[k] {
+                    force = load * here[k];
+                    slope = load * (after[k] - before[k]) / (2.0 * step);
+                    bend = load * (after[k] - 2.0 * here[k] + before[k]) / (step * step);
+                }
                 all[0].push(finite_or_zero(-slope * radius / v));
                 all[1].push(finite_or_zero(slope * radius * omega / (v * v)));
                 all[2].push(finite_or_zero(force));
                 all[3].push(finite_or_zero(slope));
-                // Of x/(1 + x²): 2x (x² − 3)/(1 + x²)³.
-                let bend = load * 2.0 * peak / (critical * critical) * 2.0 * x * (x * x - 3.0)
-                    / shape.powi(3);
-                all[4].push(if s.rolling[k] {
-                    finite_or_zero(bend)
-                } else {
-                    0.0
-                });
+                all[4].push(finite_or_zero(bend));
             }
             let [wheel, speed, force, slip, curvature] = all;
             out.wheel.push(wheel);
@@ -137,6 +139,17 @@ pub fn parts(data: &Data, slopes: &Slopes) -> Vec<BalanceParts> {
     let drag = sigma(&|s| s.drag_sigma).max(1e-6 * data.context.max_drag);
     let wheel = sigma(&|s| s.wheel.sigma).max(1e-6 * data.context.mean_wheel_speed);
     let speed = sigma(&|s| s.speed.sigma).max(1e-6 * data.context.mean_speed);
+    let colour = data.vehicle_colour.unwrap_or(Colour {
+        std: 0.0,
+        time: VEHICLE_MEMORY_S,
+    });
+    let coloured = colour.std.max(0.3 * speed);
+    // What a filter has passed goes smoothly, which no noise that forgets does: a force would have to.
+    let slow = if data.vehicle_filtered && data.vehicle_colour.is_some() {
+        Kind::Filtered(colour.time)
+    } else {
+        Kind::Forgetting(colour.time)
+    };
     let torque = sigma(&|s| s.torque.as_ref().map_or(0.0, |t| t.sigma));
     // White noise that the smoother has passed remembers about as long as its window.
     let share = sigma(&|s| median(s.wheel.variance_share.iter().copied())).max(1e-3);
@@ -189,9 +202,9 @@ pub fn parts(data: &Data, slopes: &Slopes) -> Vec<BalanceParts> {
                 )),
                 of_slip(source(
                     "vehicle speed",
-                    Some(Kind::Forgetting(0.2)),
+                    Some(Kind::Forgetting(colour.time)),
                     &slopes.speed,
-                    0.3 * speed,
+                    coloured,
                     f64::INFINITY,
                 )),
                 source(
@@ -312,9 +325,9 @@ pub fn parts(data: &Data, slopes: &Slopes) -> Vec<BalanceParts> {
                 source("white", None, &none, level, f64::INFINITY),
                 source(
                     "vehicle speed, coloured",
-                    Some(Kind::Forgetting(0.2)),
+                    Some(slow),
                     &none,
-                    0.3 * level,
+                    mass * coloured,
                     f64::INFINITY,
                 ),
                 source(
@@ -431,5 +444,57 @@ impl BalanceParts {
             DIFFUSE * start,
             &self.parts(run),
         )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::innovations::toy::{CRITICAL, Noise, PEAK, stop};
+    use crate::mechanism::Id;
+    use crate::model::Term;
+
+    const NOISE: Noise = Noise {
+        wheel: 0.3,
+        drag: 15.0,
+        load: 40.0,
+        torque: 5.0,
+    };
+
+    #[test]
+    fn the_slope_is_that_of_the_law_and_of_all_that_terms_make_of_it() {
+        let data = stop(NOISE, 5);
+        let law = Model::of_law(PEAK, CRITICAL);
+        let plain = Slopes::new(&data, &law);
+        let s = &data.series[0];
+        for k in (0..s.len()).step_by(97).filter(|k| s.rolling[*k]) {
+            let x = s.slip(k, data.context.radius) / CRITICAL;
+            let expected =
+                s.load.smooth[k] * 2.0 * PEAK / CRITICAL * (1.0 - x * x) / (1.0 + x * x).powi(2);
+            let scale = s.load.smooth[k] * PEAK / CRITICAL;
+            assert!((plain.slip[0][k] - expected).abs() < 1e-5 * scale, "{k}");
+        }
+        let entries = data.catalogue.entries().iter();
+        let entry = entries
+            .enumerate()
+            .find(|(_, m)| m.id() == Id::WearDrift && m.form() == "energy")
+            .map(|(entry, _)| entry)
+            .unwrap();
+        let mut worn = law;
+        worn.terms.push(Term {
+            entry,
+            parameters: vec![0.7],
+        });
+        let worn = Slopes::new(&data, &worn);
+        // A wear is a factor on friction: on its slope as well, down to exp(-0.7) at the end.
+        let mut least = f64::INFINITY;
+        for k in (0..s.len()).filter(|k| plain.force[0][*k].abs() > 300.0) {
+            let factor = worn.force[0][k] / plain.force[0][k];
+            let difference = worn.slip[0][k] - factor * plain.slip[0][k];
+            let scale = s.load.smooth[k] * PEAK / CRITICAL;
+            assert!(difference.abs() < 1e-5 * scale, "{k}: {difference}");
+            least = least.min(factor);
+        }
+        assert!((least - f64::exp(-0.7)).abs() < 0.02, "{least}");
     }
 }

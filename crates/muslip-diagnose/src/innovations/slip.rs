@@ -26,7 +26,7 @@ pub fn reconciled(mut data: Data, base: &Judged) -> Data {
     let Some(parts) = base.parts.iter().find(tyre) else {
         return data;
     };
-    let slopes = Slopes::new(&data, &base.model.base);
+    let slopes = Slopes::new(&data, &base.model);
     let radius = data.context.radius;
     for (run, s) in data.series.iter_mut().enumerate() {
         let blocks = &data.blocks[run][Balance::Tyre as usize].samples;
@@ -113,7 +113,7 @@ mod tests {
         };
         let mut base = judge(data, &Model::of_law(PEAK, CRITICAL), &[], None, effort).unwrap();
         // The sensors' own sizes: fitted ones may call the speeds' noise the drag's.
-        base.parts = parts(data, &Slopes::new(data, &base.model.base));
+        base.parts = parts(data, &Slopes::new(data, &base.model));
         base
     }
 
@@ -121,7 +121,7 @@ mod tests {
     fn bought(data: &Data, model: &Model) -> f64 {
         let blocks = &data.blocks[0][0];
         let e = blocks.mean(&rows_of(data, model, 0).tyre);
-        let law = blocks.mean(&Slopes::new(data, &model.base).force[0]);
+        let law = blocks.mean(&Slopes::new(data, model).force[0]);
         let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
         // Free rolling: what the law says there is noise.
         let rolling: Vec<usize> = (0..e.len()).filter(|k| law[*k].abs() < 150.0).collect();

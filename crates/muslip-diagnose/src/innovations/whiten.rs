@@ -32,6 +32,52 @@ pub enum Kind {
     Walk,
     /// Forgets with this time constant in s and is integrated into the walk.
     Integrated(f64),
+    /// White noise that has passed two poles whose time constants are this one, in s, but for [`APART`]: what a filtered
+    /// reading errs by. At most one a balance, of at most [`MOST`] less one parts.
+    Filtered(f64),
+}
+
+/// By what factor the poles of filtered noise differ from their mean: equal ones would be no sum of two parts.
+const APART: f64 = 1.2;
+
+/// The second state of filtered noise is the last one.
+const TWIN: usize = MOST - 1;
+
+/// Filtered noise is the difference of two parts that one white noise drives, each forgetting with one of the poles.
+#[derive(Clone, Copy)]
+struct Pair {
+    /// State of the first part; that of the second is [`TWIN`].
+    at: usize,
+    /// Variances of both and their covariance where the difference has a variance of one.
+    variances: [f64; 3],
+}
+
+impl Pair {
+    fn of(parts: &[Part<'_>]) -> Option<Self> {
+        let is_filtered = |part: &Part<'_>| matches!(part.kind, Kind::Filtered(_));
+        let at = parts.iter().position(is_filtered)?;
+        debug_assert!(parts.len() < MOST, "{} parts", parts.len());
+        // Rates over that of the mean.
+        let (fast, slow) = (APART, 1.0 / APART);
+        let variances = [0.5 / slow, 0.5 / fast, 1.0 / (slow + fast)];
+        let whole = variances[0] + variances[1] - 2.0 * variances[2];
+        Some(Self {
+            at,
+            variances: variances.map(|v| v / whole),
+        })
+    }
+
+    /// What a unit of variance adds over a step, to the first part, the second and what they share.
+    #[inline(always)]
+    fn driven(&self, start: f64, decay: &[f64; MOST]) -> [f64; 3] {
+        let (a, b) = (decay[self.at], decay[TWIN]);
+        let [first, second, shared] = self.variances;
+        [
+            first * (start + 1.0 - a * a),
+            second * (start + 1.0 - b * b),
+            shared * (start + 1.0 - a * b),
+        ]
+    }
 }
 
 /// One part of the noise on one run.
@@ -49,6 +95,7 @@ pub struct Part<'a> {
 pub struct Whitener {
     /// One where a part is integrated into the walk, else nothing.
     integrated: [f64; MOST],
+    filtered: Option<Pair>,
     /// Samples in use, in order.
     pub samples: Vec<usize>,
     steps: Vec<Step>,
@@ -92,10 +139,17 @@ fn same(a: f64, b: f64) -> bool {
 
 /// What each part keeps of itself over a step of time.
 fn decays(parts: &[Part<'_>], dt: f64) -> [f64; MOST] {
-    core::array::from_fn(|i| match parts.get(i).map(|part| part.kind) {
+    let mut all = core::array::from_fn(|i| match parts.get(i).map(|part| part.kind) {
         Some(Kind::Forgetting(tau) | Kind::Integrated(tau)) => (-dt / tau).exp(),
+        Some(Kind::Filtered(tau)) => (-dt / (APART * tau)).exp(),
         _ => 1.0,
-    })
+    });
+    for part in parts {
+        if let Kind::Filtered(tau) = part.kind {
+            all[TWIN] = (-dt * APART / tau).exp();
+        }
+    }
+    all
 }
 
 impl Whitener {
@@ -119,6 +173,7 @@ impl Whitener {
                 Some(part) if walk && is_integrated(part) => 1.0,
                 _ => 0.0,
             }),
+            filtered: Pair::of(parts),
             samples: Vec::new(),
             steps: Vec::new(),
             decays: Vec::new(),
@@ -141,14 +196,18 @@ impl Whitener {
                     spans.len() - 1
                 });
                 out.samples.push(k);
+                let mut row = core::array::from_fn(|i| {
+                    parts.get(i).map_or(0.0, |part| match part.kind {
+                        Kind::Integrated(_) => 0.0,
+                        _ => part.gain.get(k).copied().unwrap_or(1.0),
+                    })
+                });
+                if let Some(pair) = &out.filtered {
+                    row[TWIN] = -row[pair.at];
+                }
                 out.steps.push(Step {
                     gain: [0.0; MOST],
-                    row: core::array::from_fn(|i| {
-                        parts.get(i).map_or(0.0, |part| match part.kind {
-                            Kind::Integrated(_) => 0.0,
-                            _ => part.gain.get(k).copied().unwrap_or(1.0),
-                        })
-                    }),
+                    row,
                     inverse: 0.0,
                     dt,
                     decay: decay as u32,
@@ -181,7 +240,15 @@ impl Whitener {
                 out: &mut out,
             });
         }
-        out
+        self.with_twin(out)
+    }
+
+    /// What filtered noise's second state says belongs to its part.
+    fn with_twin(&self, mut of: ByVariance) -> ByVariance {
+        if let Some(pair) = &self.filtered {
+            of.parts[pair.at] += core::mem::take(&mut of.parts[TWIN]);
+        }
+        of
     }
 
     /// What a unit of each part's variance adds before a reading.
@@ -190,21 +257,38 @@ impl Whitener {
         let start = if at == 0 { 1.0 } else { 0.0 };
         let step = &self.steps[at];
         let decay = &self.decays[step.decay as usize];
-        core::array::from_fn(|i| match kinds[i] {
+        let mut all = core::array::from_fn(|i| match kinds[i] {
             Kind::Walk => step.dt,
             Kind::Constant => start,
-            Kind::Forgetting(_) | Kind::Integrated(_) => start + 1.0 - decay[i] * decay[i],
-        })
+            Kind::Forgetting(_) | Kind::Integrated(_) | Kind::Filtered(_) => {
+                start + 1.0 - decay[i] * decay[i]
+            }
+        });
+        if let Some(pair) = &self.filtered {
+            let [first, second, _] = pair.driven(start, decay);
+            all[pair.at] = first;
+            all[TWIN] = second;
+        }
+        all
+    }
+
+    /// What both states of filtered noise are driven by together, where there is such noise: its part, twice that.
+    #[inline(always)]
+    fn driven_together(&self, at: usize) -> Option<(usize, f64)> {
+        let pair = self.filtered.as_ref()?;
+        let start = if at == 0 { 1.0 } else { 0.0 };
+        let decay = &self.decays[self.steps[at].decay as usize];
+        Some((pair.at, 2.0 * pair.driven(start, decay)[2]))
     }
 
     /// Tr V⁻¹ K, K being what a unit of a variance adds to V: the slope of log|V|, by the same pass.
     #[must_use]
     pub fn traces(&self, parts: &[Part<'_>]) -> ByVariance {
         let kinds = kinds(parts);
-        Arch::new().dispatch(Traces {
+        self.with_twin(Arch::new().dispatch(Traces {
             whitener: self,
             kinds: &kinds,
-        })
+        }))
     }
 
     /// Innovations of several columns, each over its own standard deviation.
@@ -250,22 +334,36 @@ impl WithSimd for Covariance<'_> {
                     p[i][i] = variance;
                     forgotten[i] = variance;
                 }
+                Kind::Filtered(_) => {}
             }
         }
         let Whitener {
             integrated,
+            filtered,
             steps,
             decays,
             log_variances,
             ..
         } = self.whitener;
-        for step in steps {
+        let pair = filtered.map(|pair| {
+            let std = self.parts[pair.at].std;
+            (pair, std * std)
+        });
+        for (at, step) in steps.iter_mut().enumerate() {
             let decay = &decays[step.decay as usize];
             let along = along(integrated, step.dt);
             predict(&mut p, decay, &along);
             p[0][0] += walked * step.dt;
             for i in 0..MOST {
                 p[i][i] += forgotten[i] * (1.0 - decay[i] * decay[i]);
+            }
+            if let Some((pair, variance)) = &pair {
+                let start = if at == 0 { 1.0 } else { 0.0 };
+                let [first, second, shared] = pair.driven(start, decay);
+                p[pair.at][pair.at] += variance * first;
+                p[TWIN][TWIN] += variance * second;
+                p[pair.at][TWIN] += variance * shared;
+                p[TWIN][pair.at] += variance * shared;
             }
             if step.fresh {
                 forget_level(&mut p, self.diffuse);
@@ -318,6 +416,9 @@ impl WithSimd for Traces<'_> {
             let driven = self.whitener.driven(at, self.kinds);
             for i in 0..MOST {
                 out.parts[i] += s[i][i] * driven[i];
+            }
+            if let Some((i, together)) = self.whitener.driven_together(at) {
+                out.parts[i] += s[i][TWIN] * together;
             }
             let decay = &self.whitener.decays[step.decay as usize];
             let along = along(&self.whitener.integrated, step.dt);
@@ -375,6 +476,10 @@ impl WithSimd for Squares<'_> {
             for i in 0..MOST {
                 let square: f64 = s[i].iter().map(|x| x * x).sum();
                 self.out.parts[i] += square * driven[i];
+            }
+            if let Some((i, together)) = self.whitener.driven_together(at) {
+                let product: f64 = s[i].iter().zip(&s[TWIN]).map(|(a, b)| a * b).sum();
+                self.out.parts[i] += product * together;
             }
             let decay = &self.whitener.decays[step.decay as usize];
             let level = s[0];
@@ -546,6 +651,21 @@ mod tests {
         let n = used.len();
         let mut covariance = DMatrix::identity(n, n) * (WHITE * WHITE);
         let starts: Vec<usize> = segments.iter().map(|s| s.start).collect();
+        for part in parts {
+            if let Kind::Filtered(tau) = part.kind {
+                // The covariance of white noise behind two poles, in closed form.
+                let (a, b) = (1.0 / (APART * tau), APART / tau);
+                let at = |lag: f64| {
+                    (-a * lag).exp() * (0.5 / a - 1.0 / (a + b))
+                        + (-b * lag).exp() * (0.5 / b - 1.0 / (a + b))
+                };
+                covariance += DMatrix::from_fn(n, n, |i, j| {
+                    let gain = |i: usize| part.gain.get(used[i]).copied().unwrap_or(1.0);
+                    let lag = (time[used[i]] - time[used[j]]).abs();
+                    part.std * part.std * gain(i) * gain(j) * at(lag) / at(0.0)
+                });
+            }
+        }
         let mut add = |effect: &DVector<f64>| covariance += effect * effect.transpose();
         for part in parts {
             for cause in 0..n {
@@ -590,6 +710,7 @@ mod tests {
                             };
                             x = decay * x + here * fresh * part.std;
                         }
+                        Kind::Filtered(_) => {}
                     }
                     let gain = part.gain.get(k).copied().unwrap_or(1.0);
                     effect[i] = if matches!(part.kind, Kind::Integrated(_)) {
@@ -653,6 +774,11 @@ mod tests {
                     std: 0.5,
                     gain: &[],
                 },
+                Part {
+                    kind: Kind::Filtered(0.06),
+                    std: 0.9,
+                    gain: &gain,
+                },
             ];
             assert!(worst_difference(&parts, &time, &mut draw) < 1e-9);
         }
@@ -702,8 +828,9 @@ mod tests {
                 Kind::Integrated(0.1),
                 Kind::Constant,
                 Kind::Integrated(0.7),
+                Kind::Filtered(0.06),
             ];
-            let gained = [false, true, false, true, false];
+            let gained = [false, true, false, true, false, true];
             kinds
                 .into_iter()
                 .zip(gained)
@@ -715,29 +842,29 @@ mod tests {
                 })
                 .collect::<Vec<_>>()
         };
-        let filter = |variances: &[f64; 6]| {
+        let filter = |variances: &[f64; 7]| {
             Whitener::new(
                 &time,
                 &segments,
                 1,
-                variances[5].sqrt(),
+                variances[6].sqrt(),
                 1e6,
-                &parts(&variances[..5]),
+                &parts(&variances[..6]),
             )
         };
-        let value = |variances: &[f64; 6]| {
+        let value = |variances: &[f64; 7]| {
             let whitener = filter(variances);
             let squares: f64 = whitener.apply(&refs).iter().flatten().map(|x| x * x).sum();
             whitener.log_variances.iter().sum::<f64>() + squares
         };
-        let here = [0.4, 0.6, 2.0, 1.2, 0.8, 0.5];
+        let here = [0.4, 0.6, 2.0, 1.2, 0.8, 0.7, 0.5];
         let whitener = filter(&here);
-        let traces = whitener.traces(&parts(&here[..5]));
+        let traces = whitener.traces(&parts(&here[..6]));
         let white = whitener.apply(&refs);
         let white: Vec<&[f64]> = white.iter().map(Vec::as_slice).collect();
-        let squares = whitener.squares(&white, &parts(&here[..5]));
-        for i in 0..6 {
-            let own = if i == 5 {
+        let squares = whitener.squares(&white, &parts(&here[..6]));
+        for i in 0..7 {
+            let own = if i == 6 {
                 traces.white - squares.white
             } else {
                 traces.parts[i] - squares.parts[i]
