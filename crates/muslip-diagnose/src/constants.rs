@@ -57,7 +57,7 @@ pub const LEAST_T_OF_DEPENDENCE: f64 = 3.0;
 /// Least gain of a free dependence at the sensors' noise, nats: it has more parameters than a mechanism and follows more of
 /// what chains leave. None of 64 development campaigns that lack nothing has one.
 pub const LEAST_GAIN_OF_DEPENDENCE_AT_SENSORS: f64 = 150.0;
-/// As [`LEAST_GAIN_OF_DEPENDENCE_AT_SENSORS`]: least t of the gains' signed roots.
+/// As [`LEAST_GAIN_OF_DEPENDENCE_AT_SENSORS`]: least t of the gains' signed roots, of one that stands, too.
 pub const LEAST_T_OF_DEPENDENCE_AT_SENSORS: f64 = 2.4;
 /// Logarithm by which a hidden dependence lowers the mean square error of the drag at least.
 pub const LEAST_PREDICTED_BY_DEPENDENCE: f64 = 0.05;

@@ -351,11 +351,14 @@ pub fn left_open(trial: &Trial) -> bool {
 /// Whether unseen runs gain, and alike.
 fn seen_on_unseen_runs(trial: &Trial) -> bool {
     let (mean, t) = trial.unseen;
-    let least = match trial.claim {
-        Claim::Mechanism(..) => LEAST_T,
-        Claim::Dependence(_) => LEAST_T_OF_DEPENDENCE,
-    };
-    mean > 0.0 && t >= least
+    match trial.claim {
+        Claim::Mechanism(..) => mean > 0.0 && t >= LEAST_T,
+        // What says nothing of what it is has to be seen at the sensors' noise as well: fitted noise may have left it.
+        Claim::Dependence(_) => {
+            let at_sensors = trial.at_sensors.1 > LEAST_T_OF_DEPENDENCE_AT_SENSORS;
+            mean > 0.0 && t >= LEAST_T_OF_DEPENDENCE && at_sensors
+        }
+    }
 }
 
 #[cfg(test)]
