@@ -84,6 +84,23 @@ fn split<'a, T>(model: &'a Model, p: &'a [T]) -> impl Iterator<Item = (usize, &'
     })
 }
 
+/// Applies the terms of one stage, each with its own parameters.
+fn apply_stage<T: Listed>(
+    catalogue: &Catalogue,
+    terms: &[(usize, &[T])],
+    stage: Stage,
+    series: &Series,
+    context: &Context,
+    state: &mut State<T>,
+) {
+    for (entry, own) in terms {
+        let mechanism = T::entry(catalogue, *entry);
+        if mechanism.stage() == stage {
+            mechanism.apply(own, series, context, state);
+        }
+    }
+}
+
 /// Runs the tyre model on one recording up to the friction, at the slip and so much beyond it.
 pub fn friction<T: Listed>(
     catalogue: &Catalogue,
@@ -132,12 +149,7 @@ pub fn friction<T: Listed>(
     state.law = Law::rudd(log_peak.exp(), log_critical.exp());
     let terms: Vec<(usize, &[T])> = split(model, p).collect();
     let run = |stage: Stage, state: &mut State<T>| {
-        for (entry, own) in &terms {
-            let mechanism = T::entry(catalogue, *entry);
-            if mechanism.stage() == stage {
-                mechanism.apply(own, series, context, state);
-            }
-        }
+        apply_stage(catalogue, &terms, stage, series, context, state);
     };
     run(Stage::Kinematics, &mut state);
     let nominal_radius = T::constant(context.radius);
@@ -183,12 +195,7 @@ pub fn tyre<T: Listed>(
     let mut state = friction(catalogue, model, p, series, context, 0.0);
     let terms: Vec<(usize, &[T])> = split(model, p).collect();
     let run = |stage: Stage, state: &mut State<T>| {
-        for (entry, own) in &terms {
-            let mechanism = T::entry(catalogue, *entry);
-            if mechanism.stage() == stage {
-                mechanism.apply(own, series, context, state);
-            }
-        }
+        apply_stage(catalogue, &terms, stage, series, context, state);
     };
     state.force = (0..n).map(|k| state.friction[k] * state.load[k]).collect();
     // What remembers acts on what the readings say, not on what the drag, noise and all, says of them.

@@ -8,9 +8,18 @@ use super::structure::{Memory, Pair, Structure, structure};
 use super::tyre::Stretch;
 use crate::smooth::median_in_place;
 
-/// Standard deviation and time constant of the part of residuals that lasts longer than two steps, where it is most of them.
+/// Noise that forgets exponentially.
+#[derive(Clone, Copy, Debug)]
+pub struct Colour {
+    /// Standard deviation, in the channel's unit.
+    pub std: f64,
+    /// Time constant in s.
+    pub time: f64,
+}
+
+/// The part of residuals that lasts longer than two steps, where it is most of them.
 #[must_use]
-pub fn coloured(residual: &[Vec<f64>], step: f64) -> Option<(f64, f64)> {
+pub fn coloured(residual: &[Vec<f64>], step: f64) -> Option<Colour> {
     let most = (0.25 / step) as usize;
     let covariance = |lag: usize| -> f64 {
         let (mut sum, mut count) = (0.0, 0.0);
@@ -32,29 +41,25 @@ pub fn coloured(residual: &[Vec<f64>], step: f64) -> Option<(f64, f64)> {
     // An exponential through two lags.
     let time = 4.0 * step / (near / far).ln();
     let variance = near * (2.0 * step / time).exp();
-    (variance > COLOURED_SHARE * whole && time < LONGEST_COLOUR_S && time > 4.0 * step)
-        .then(|| (variance.min(whole).sqrt(), time))
-}
-
-/// Noise that forgets exponentially.
-#[derive(Clone, Copy, Debug)]
-pub struct Colour {
-    /// Standard deviation, in the channel's unit.
-    pub std: f64,
-    /// Time constant in s.
-    pub time: f64,
+    (variance > COLOURED_SHARE * whole && time < LONGEST_COLOUR_S && time > 4.0 * step).then(|| {
+        Colour {
+            std: variance.min(whole).sqrt(),
+            time,
+        }
+    })
 }
 
 /// The vehicle speed's coloured noise, and what is said of it.
 #[must_use]
 pub fn of_vehicle(residual: &[Vec<f64>], step: f64, white: f64) -> Option<(Finding, Colour)> {
-    let (std, time) = coloured(residual, step)?;
+    let colour = coloured(residual, step)?;
+    let Colour { std, time } = colour;
     let blocks = residual.iter().map(|b| b.len() as f64 * step).sum::<f64>() / time;
     (std > white && blocks > 40.0).then(|| {
         let finding = Finding::of("vehicle_speed_m_s", Word::ColouredNoise, (std, std / (0.5 * blocks).sqrt()), "m/s").saying(format!(
             "The noise of the vehicle speed has a slow part of {std:.4} m/s with a time constant of {time:.2} s."
         ));
-        (finding, Colour { std, time })
+        (finding, colour)
     })
 }
 
@@ -201,7 +206,7 @@ mod tests {
     fn coloured_noise_has_its_size_and_time_and_white_noise_none() {
         assert!(coloured(&[noise(0.0)], 0.01).is_none());
         let keep = (-0.1f64).exp();
-        let (std, time) = coloured(&[noise(keep)], 0.01).unwrap();
+        let Colour { std, time } = coloured(&[noise(keep)], 0.01).unwrap();
         let expected = (1.0 / 12.0 / (1.0 - keep * keep)).sqrt();
         assert!(
             (std / expected - 1.0).abs() < 0.1 && (time - 0.1).abs() < 0.02,

@@ -559,13 +559,7 @@ mod tests {
         use crate::innovations::toy::{CRITICAL, Noise, PEAK, stop};
         use crate::mechanism::Id;
         use crate::model::Term;
-        let noise = Noise {
-            wheel: 0.3,
-            drag: 15.0,
-            load: 40.0,
-            torque: 5.0,
-        };
-        let data = stop(noise, 4);
+        let data = stop(Noise::TYPICAL, 4);
         let effort = Effort {
             steps: 8,
             noise_steps: 20,

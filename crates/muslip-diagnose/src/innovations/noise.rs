@@ -454,16 +454,9 @@ mod tests {
     use crate::mechanism::Id;
     use crate::model::Term;
 
-    const NOISE: Noise = Noise {
-        wheel: 0.3,
-        drag: 15.0,
-        load: 40.0,
-        torque: 5.0,
-    };
-
     #[test]
     fn the_slope_is_that_of_the_law_and_of_all_that_terms_make_of_it() {
-        let data = stop(NOISE, 5);
+        let data = stop(Noise::TYPICAL, 5);
         let law = Model::of_law(PEAK, CRITICAL);
         let plain = Slopes::new(&data, &law);
         let s = &data.series[0];

@@ -98,13 +98,6 @@ mod tests {
     use crate::innovations::toy::{CRITICAL, Noise, PEAK, stop};
     use crate::model::Model;
 
-    const NOISE: Noise = Noise {
-        wheel: 0.3,
-        drag: 15.0,
-        load: 40.0,
-        torque: 5.0,
-    };
-
     fn judged(data: &Data) -> Judged {
         let effort = Effort {
             steps: 3,
@@ -133,7 +126,7 @@ mod tests {
 
     #[test]
     fn rows_stay_what_they_are_to_first_order() {
-        let data = stop(NOISE, 1);
+        let data = stop(Noise::TYPICAL, 1);
         let base = judged(&data);
         let other = reconciled(data.clone(), &base);
         let (a, b) = (
@@ -152,7 +145,7 @@ mod tests {
 
     #[test]
     fn a_curve_made_flatter_buys_no_noise_of_the_speeds() {
-        let data = stop(NOISE, 2);
+        let data = stop(Noise::TYPICAL, 2);
         let base = judged(&data);
         let (before, after) = (
             bought(&data, &base.model),
@@ -164,7 +157,7 @@ mod tests {
 
     #[test]
     fn a_load_that_only_its_noise_moves_is_taken_as_steady() {
-        let data = stop(NOISE, 3);
+        let data = stop(Noise::TYPICAL, 3);
         let quiet = reconciled(data.clone(), &judged(&data));
         let spread = |data: &Data| {
             let load = &data.series[0].load.smooth;

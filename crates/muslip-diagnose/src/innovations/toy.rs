@@ -25,6 +25,16 @@ pub(super) struct Noise {
     pub(super) torque: f64,
 }
 
+impl Noise {
+    /// Of a common measuring chain: rad/s, N, N, N m.
+    pub(super) const TYPICAL: Self = Self {
+        wheel: 0.3,
+        drag: 15.0,
+        load: 40.0,
+        torque: 5.0,
+    };
+}
+
 /// A quarter car whose brake comes and goes four times while it coasts, free rolling in between.
 pub(super) fn stop(noise: Noise, seed: u64) -> Data {
     let rig = Rig {
