@@ -35,7 +35,7 @@ pub const ALIKE_NATS: f64 = 0.5;
 pub const SOFTNESS: f64 = 4.0;
 /// As [`SOFTNESS`], as a share of what the better one gains.
 pub const SOFT_SHARE: f64 = 0.03;
-/// Share of another's gain from which a name that predicts the drag clearly better comes first.
+/// Share of another's gain from which a memory that predicts the drag clearly better comes first.
 pub const ALIKE_SHARE: f64 = 0.7;
 /// Logarithm of the mean square error by which a prediction is clearly better.
 pub const PREDICTED_APART: f64 = 0.1;
@@ -97,6 +97,8 @@ pub const UNKNOWN_STDS: f64 = 3.0;
 pub const LEAST_STD_S: f64 = 5e-4;
 /// Least share of a speed's rate that is taken for the speed's.
 pub const LEAST_RELIABLE: f64 = 0.02;
+/// Standard deviations by which a vehicle's lateness has to differ from none before it is taken off a fresh run.
+pub const LEAST_STDS_TOLD: f64 = 2.0;
 /// A delay is named where it is so many standard deviations from none.
 pub const SURE_DELAY: f64 = 5.0;
 /// As [`SURE_DELAY`], from this size, s: what no engineer would correct.
@@ -111,7 +113,8 @@ pub const AUDITED: f64 = 2.0;
 
 /// Least mean logarithm by which a repaired model lowers the square of a prediction's error: less is chance.
 pub const LEAST_GAIN_OF_PREDICTION: f64 = 0.02;
-/// Factor on the square of a recording's error that is still no worse: one percent, as the bench has it.
+/// Factor on the square of a recording's error that is still no worse: one percent, as the bench has it. (How sure the
+/// gain has to be is one standard deviation of what the next recording gains.)
 pub const MOST_WORSE: f64 = 1.01;
 /// Fewest samples of a run from which its tyre balance says anything.
 pub const LEAST_OF_TYRE: usize = 30;

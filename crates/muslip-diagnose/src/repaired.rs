@@ -245,6 +245,7 @@ impl Repaired {
         Self {
             late: Lateness::default(),
             base: self.base_alone.clone(),
+            base_unplaced: Vec::new(),
             tyre: Vec::new(),
             corrections: Vec::new(),
             ..self.clone()

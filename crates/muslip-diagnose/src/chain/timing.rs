@@ -6,7 +6,7 @@ use crate::audit::{Audit, Timing as Late};
 use crate::campaign::{Rig, Run};
 use crate::constants::{
     ALIKE_LATE, ALIKE_LATE_S, AUDIT_REACH, LEAST_BRAKE_EARLY_S, LEAST_DRAG_LATE_S, LEAST_RELIABLE,
-    LEAST_STD_S, LEAST_USABLE, UNKNOWN_STDS, VAGUE_S,
+    LEAST_STD_S, LEAST_STDS_TOLD, LEAST_USABLE, UNKNOWN_STDS, VAGUE_S,
 };
 use crate::data::Data;
 use crate::innovations::blocks::blocks;
@@ -44,17 +44,22 @@ impl Timing {
         }
     }
 
-    /// How late the drag is, in s, where a speed and all other channels are early, and alike.
+    /// How late the drag is, in s, where a speed and all other channels are early, and alike. Beside a wheel's speed and
+    /// a brake that are, a vehicle's that is late says nothing against it: its receiver is.
     fn drag_late(&self) -> Option<f64> {
-        let all = [self.wheel, self.vehicle, self.brake];
-        let known = || all.iter().filter(|l| l.std < VAGUE_S);
-        let weight: f64 = known().map(|l| l.std.powi(-2)).sum();
-        let mean = known().map(|l| -l.value * l.std.powi(-2)).sum::<f64>() / weight;
+        let known = |l: &&Late| l.std < VAGUE_S;
+        let early = |l: &Late| known(&l) && l.value < 0.0;
+        let late_receiver = early(&self.wheel) && early(&self.brake) && !early(&self.vehicle);
+        let all = [self.wheel, self.brake, self.vehicle];
+        let asked = &all[..if late_receiver { 2 } else { 3 }];
+        let told = || asked.iter().filter(known);
+        let weight: f64 = told().map(|l| l.std.powi(-2)).sum();
+        let mean = told().map(|l| -l.value * l.std.powi(-2)).sum::<f64>() / weight;
         let alike =
             |l: &Late| (-l.value - mean).abs() < ALIKE_LATE * mean + ALIKE_LATE_S + 2.0 * l.std;
         // A brake alone says as little of the drag as the drag does of it.
-        let speed = [self.wheel, self.vehicle].iter().any(|l| l.std < VAGUE_S);
-        (speed && mean > LEAST_DRAG_LATE_S && known().all(alike)).then_some(mean)
+        let speed = [self.wheel, self.vehicle].iter().any(|l| known(&l));
+        (speed && mean > LEAST_DRAG_LATE_S && told().all(alike)).then_some(mean)
     }
 
     /// Leaves the drag as late as it is against all others.
@@ -65,6 +70,17 @@ impl Timing {
         self.late.brake += drag;
         for late in [&mut self.wheel, &mut self.vehicle, &mut self.brake] {
             late.value += drag;
+        }
+    }
+
+    /// What is taken off where a fresh run is predicted: recordings in which the vehicle's speed hardly changes say
+    /// nothing of its lateness, and a run in which it does would be predicted by a guess.
+    #[must_use]
+    pub fn told(&self) -> Lateness {
+        let told = self.vehicle.value.abs() > LEAST_STDS_TOLD * self.vehicle.std;
+        Lateness {
+            vehicle: if told { self.late.vehicle } else { 0.0 },
+            ..self.late
         }
     }
 
@@ -263,8 +279,12 @@ pub fn timed(
             let (mut data, mut judged) = (data, judged);
             if drag.is_some() || brake {
                 data = at_one_time(rig, &runs, averaged, timing.late, audit, split);
-                if brake {
-                    // What is to be explained is not to be explained away.
+                // What is to be explained is not to be explained away: a drag that two others say is late, or a brake.
+                let both = drag.is_some() && timing.brake.std < VAGUE_S;
+                if both {
+                    data.timing_std.wheel = LEAST_STD_S;
+                }
+                if both || brake {
                     data.timing_std.brake = LEAST_STD_S;
                 }
                 judged = judge(&data, &model, &[], Some(Guess::of(&judged.parts)), effort)?;
@@ -371,6 +391,31 @@ mod tests {
         let late = timing(-0.010, -0.011, -0.010).drag_late();
         assert!((late.unwrap() - 0.0103).abs() < 5e-4);
         assert_eq!(timing(0.010, 0.011, 0.010).drag_late(), None);
+    }
+
+    #[test]
+    fn a_late_receiver_says_nothing_against_a_late_drag() {
+        let late = timing(-0.010, 0.030, -0.011).drag_late();
+        assert!((late.unwrap() - 0.0105).abs() < 5e-4);
+        // A filter of the drag's that the brake has, too.
+        assert_eq!(timing(-0.010, 0.030, 0.000).drag_late(), None);
+        assert_eq!(timing(0.004, 0.030, -0.011).drag_late(), None);
+        let mut no_brake = timing(-0.010, 0.030, 0.0);
+        no_brake.brake.std = 0.02;
+        assert_eq!(no_brake.drag_late(), None);
+    }
+
+    #[test]
+    fn a_lateness_of_the_vehicle_that_is_not_told_from_none_is_not_taken_off_a_fresh_run() {
+        let mut timing = timing(0.010, -0.055, 0.0);
+        timing.late = Lateness {
+            wheel: 0.010,
+            vehicle: -0.055,
+            ..Lateness::default()
+        };
+        assert_eq!(timing.told(), timing.late);
+        timing.vehicle.std = 0.09;
+        assert_eq!((timing.told().wheel, timing.told().vehicle), (0.010, 0.0));
     }
 
     #[test]

@@ -11,7 +11,7 @@ use crate::data::Data;
 use crate::innovations::candidates::{Candidate, Table, table};
 use crate::innovations::dependence::Dependence;
 use crate::innovations::gram::total;
-use crate::innovations::hypothesis::{Effort, Guess, Judged, judge, noise_stride, table_grams};
+use crate::innovations::hypothesis::{Effort, Guess, judge, noise_stride, table_grams};
 use crate::innovations::noise::{BalanceParts, Slopes};
 use crate::innovations::rows::rows_of;
 use crate::innovations::screen::{Score, scores};
@@ -185,14 +185,14 @@ pub struct Screen<'a> {
 }
 
 impl<'a> Screen<'a> {
-    /// Scores all but the ids excluded; `chain_s` is what the chain's own timing was off by, in s.
+    /// Scores all but the ids excluded beside the model so far.
     pub fn new(
         data: &'a Data,
-        so_far: &'a Judged,
+        before: Before<'a>,
         free: &'a [Dependence],
         excluded: &[Id],
-        chain_s: f64,
     ) -> Self {
+        let so_far = before.judged;
         let slopes = Slopes::new(data, &so_far.model);
         let taken = |id: Id| {
             let entry = |t: &Term| data.catalogue.get(t.entry).id() == id;
@@ -209,7 +209,6 @@ impl<'a> Screen<'a> {
             // What belongs to a balance that cannot be formed is not named for another.
             &|id| !taken(id) && data.forms(id.balance()),
         );
-        let before = Before::new(data, so_far, chain_s);
         let at = |parts: &[BalanceParts]| scores(&table, &total(&table_grams(data, parts, &table)));
         let levels: Vec<(Vec<Score>, usize)> =
             match (at(before.noise_of_sensors()), at(&so_far.parts)) {

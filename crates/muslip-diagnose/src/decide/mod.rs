@@ -7,7 +7,7 @@ mod trial;
 use finalists::{Screen, effort};
 use rank::rank;
 pub use rank::softness;
-use trial::{Before, could_stand, left_open};
+use trial::{Before, could_stand, left_open, needed};
 pub use trial::{Claim, Trial, stands, through_force};
 
 use crate::constants::{ALIKE_NATS, DEPENDENCE_NATS, DEPENDENCE_SHARE, FORM_LEFT};
@@ -66,15 +66,29 @@ impl Left {
     }
 }
 
-/// A name that was taken up, and how much spoke for it.
-type Named = (Id, f64);
+/// What was taken up in the rounds before.
+#[derive(Default)]
+struct TakenUp {
+    /// Names, and how much spoke for each.
+    names: Vec<(Id, f64)>,
+    /// What all of it gained at the sensors' noise, in nats.
+    at_sensors: f64,
+}
+
+impl TakenUp {
+    fn add(&mut self, trial: &Trial) {
+        self.at_sensors += trial.at_sensors.0.max(0.0);
+        let name = trial.mechanism().map(|(id, _)| (id, trial.weight()));
+        self.names.extend(name);
+    }
+}
 
 /// Whether a trial is of an alias of what was named, and so small beside it that it is what that name's form leaves.
-fn left_by_form(trial: &Trial, named: &[Named]) -> bool {
+fn left_by_form(trial: &Trial, before: &TakenUp) -> bool {
     let Some((id, _)) = trial.mechanism() else {
         return false;
     };
-    named.iter().any(|&(other, weight)| {
+    before.names.iter().any(|&(other, weight)| {
         let small = trial.weight() < FORM_LEFT * weight;
         small && other.aliases().iter().any(|alias| alias.with == id)
     })
@@ -82,7 +96,7 @@ fn left_by_form(trial: &Trial, named: &[Named]) -> bool {
 
 /// The trial that is taken up: a mechanism, unless a free dependence accounts for much more in the same balance. One
 /// in another balance is no other account of it, and has its turn later.
-fn taken_up<'a>(data: &Data, trials: &'a [Trial], before: &[Named]) -> Option<&'a Trial> {
+fn next<'a>(data: &Data, trials: &'a [Trial], before: &TakenUp) -> Option<&'a Trial> {
     let own = |t: &&Trial| stands(t) && !left_by_form(t, before);
     let standing = || trials.iter().filter(own);
     let Some(named) = standing().find(|t| t.mechanism().is_some()) else {
@@ -115,13 +129,14 @@ struct Question<'a> {
 
 impl Question<'_> {
     /// One round beside a model: all trials, best first, and how large each mechanism would have to be to be seen.
-    fn round(&self, so_far: &Judged, named: &[Named]) -> (Vec<Trial>, Vec<Seen>) {
+    fn round(&self, so_far: &Judged, taken_up: &TakenUp) -> (Vec<Trial>, Vec<Seen>) {
         let data = self.data;
-        let screen = Screen::new(data, so_far, &self.free, self.excluded, self.chain_s);
+        let before = Before::new(data, so_far, self.chain_s, taken_up.at_sensors);
+        let screen = Screen::new(data, before, &self.free, self.excluded);
         let mut trials = screen.trials();
         // What only the chain remembers has taken the place of other names.
         let of_chain = trials.iter().any(|t| !t.outlasts_chain);
-        if of_chain && taken_up(data, &trials, named).is_none() {
+        if of_chain && next(data, &trials, taken_up).is_none() {
             let tried: Vec<Id> = trials
                 .iter()
                 .filter_map(|t| Some(t.mechanism()?.0))
@@ -146,29 +161,27 @@ pub fn decide(data: &Data, base: Judged, excluded: &[Id], chain_s: f64) -> Decis
     let mut chosen = base.clone();
     let mut rounds = Vec::new();
     let mut seen = Vec::new();
-    let mut named: Vec<Named> = Vec::new();
+    let mut taken_up = TakenUp::default();
     let mut left = None;
-    let mut taken_up_gains = 0.0;
     while chosen.model.terms.len() + chosen.extra.len() < MOST_NAMES {
-        let (mut trials, mut sizes) = question.round(&chosen, &named);
-        let best = taken_up(data, &trials, &named);
+        let (mut trials, mut sizes) = question.round(&chosen, &taken_up);
+        let best = next(data, &trials, &taken_up);
         // A trial that came upon better sizes of the noise gains nothing by them, and no other loses.
         if let Some(better) = best.and_then(|t| at_noise_of(data, &chosen, t)) {
             chosen = better;
-            (trials, sizes) = question.round(&chosen, &named);
+            (trials, sizes) = question.round(&chosen, &taken_up);
         }
         if rounds.is_empty() {
             base = chosen.clone();
             seen = sizes;
         }
-        let next = taken_up(data, &trials, &named).cloned();
-        if next.is_none() {
-            left = Left::of(&trials, taken_up_gains);
+        let best = next(data, &trials, &taken_up).cloned();
+        if best.is_none() {
+            left = Left::of(&trials, taken_up.at_sensors);
         }
         rounds.push(trials);
-        let Some(trial) = next else { break };
-        taken_up_gains += trial.at_sensors.0.max(0.0);
-        named.extend(trial.mechanism().map(|(id, _)| (id, trial.weight())));
+        let Some(trial) = best else { break };
+        taken_up.add(&trial);
         chosen = settled(data, trial.judged);
     }
     if chosen.model.terms.len() > 1 {
@@ -229,17 +242,30 @@ fn without_idle(data: &Data, mut chosen: Judged, chain_s: f64) -> Judged {
     }
     let mut dropped = false;
     while names.model.terms.len() > 1 {
-        let idle = (0..names.model.terms.len()).filter_map(|at| {
-            let mut model = names.model.clone();
-            let term = model.terms.remove(at);
-            let claim = Claim::Mechanism(data.catalogue.get(term.entry).id(), term.entry);
-            let without = judged(&model, &[], &names)?;
-            // It was large enough when it was taken up: what counts is whether the others leave anything to it.
+        let all: Vec<Option<Judged>> = (0..names.model.terms.len())
+            .map(|at| {
+                let mut model = names.model.clone();
+                model.terms.remove(at);
+                judged(&model, &[], &names)
+            })
+            .collect();
+        // One name fewer is never likelier: where it is, its noise is the better start for all of them.
+        for without in all.iter().flatten() {
+            if without.loss < names.loss
+                && let Some(again) = judged(&names.model, &[], without)
+                && again.loss < names.loss
+            {
+                names = again;
+            }
+        }
+        let idle = all.into_iter().enumerate().filter_map(|(at, without)| {
+            let without = without?;
+            let entry = names.model.terms[at].entry;
+            let claim = Claim::Mechanism(data.catalogue.get(entry).id(), entry);
             let size = f64::INFINITY;
-            let mut trial = Before::new(data, &without, chain_s).tried(claim, names.clone(), size);
-            trial.first = true;
-            let needed = stands(&trial) || could_stand(&trial);
-            (!needed).then(|| (trial.weight(), without))
+            let before = Before::new(data, &without, chain_s, 0.0);
+            let trial = before.tried(claim, names.clone(), size);
+            (!needed(&trial)).then(|| (trial.weight(), without))
         });
         // The least of them goes, and the others are asked again.
         let Some((_, without)) = idle.min_by(|a, b| a.0.total_cmp(&b.0)) else {

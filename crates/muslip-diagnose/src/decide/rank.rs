@@ -9,7 +9,7 @@ pub fn rank(data: &Data, trials: &mut [Trial]) {
     let order = |a: &Trial, b: &Trial| b.weight().total_cmp(&a.weight());
     trials.sort_by(|a, b| order(a, b).then(b.gain.total_cmp(&a.gain)));
     least_claims_first(trials, Trial::weight, |t| balances(data, t));
-    better_predicted_first(trials, Trial::weight, |t| t.predicts);
+    better_predicted_first(trials, Trial::weight, |t| t.remembers.then_some(t.predicts));
     commoner_first(trials, Trial::weight, |t| {
         let mechanism = t.mechanism();
         mechanism.is_some_and(|(_, entry)| data.catalogue.get(entry).rare())
@@ -28,16 +28,19 @@ pub fn softness(gain: f64) -> f64 {
     SOFTNESS + SOFT_SHARE * gain
 }
 
-/// Of those that gain much the same and work through the force, the one first that predicts the drag clearly better.
+/// Of those that gain much the same and remember, the one first that predicts the drag clearly better: the chain's own
+/// kernels stand in for much of what a memory gains, but predict nothing. `predicts` is nothing for all others.
 fn better_predicted_first<T>(
     best_first: &mut [T],
     gain: impl Fn(&T) -> f64,
-    predicts: impl Fn(&T) -> f64,
+    predicts: impl Fn(&T) -> Option<f64>,
 ) {
-    let alike = |own: &T, other: &T| gain(own) > ALIKE_SHARE * gain(other);
-    let better = |own: &T, other: &T| predicts(own) > predicts(other) + PREDICTED_APART;
     sort_neighbours(best_first, |own, other| {
-        alike(own, other) && predicts(own).is_finite() && better(own, other)
+        let (Some(of_own), Some(of_other)) = (predicts(own), predicts(other)) else {
+            return false;
+        };
+        let alike = gain(own) > ALIKE_SHARE * gain(other);
+        alike && of_own.is_finite() && of_own > of_other + PREDICTED_APART
     });
 }
 
@@ -78,18 +81,20 @@ mod tests {
     use super::*;
 
     #[test]
-    fn of_those_that_gain_much_the_same_the_one_that_predicts_clearly_better_comes_first() {
-        // Gain and prediction: what gains less than 0.7 of another, or predicts but little better, stays behind it.
+    fn of_memories_that_gain_much_the_same_the_one_that_predicts_clearly_better_comes_first() {
+        // Gain and prediction: what gains less than 0.7 of another, predicts but little better, or does not remember
+        // stays behind it.
         let mut all = [
-            (400.0, 1.0),
-            (330.0, 1.4),
-            (310.0, 1.45),
-            (100.0, 9.0),
-            (90.0, f64::INFINITY),
+            (400.0, Some(1.0)),
+            (330.0, Some(1.4)),
+            (310.0, Some(1.45)),
+            (100.0, Some(9.0)),
+            (90.0, Some(f64::INFINITY)),
+            (80.0, None),
         ];
         better_predicted_first(&mut all, |t| t.0, |t| t.1);
         let gains = all.map(|t| t.0);
-        assert_eq!(gains, [330.0, 310.0, 400.0, 100.0, 90.0]);
+        assert_eq!(gains, [330.0, 310.0, 400.0, 100.0, 90.0, 80.0]);
     }
 
     #[test]

@@ -64,9 +64,11 @@ pub struct Trial {
     /// Gain on all unseen runs in nats if the noise were no larger than the sensors make plausible, and the t of the
     /// runs' gains under the root, signs kept: they are as uneven as the runs.
     pub at_sensors: (f64, f64),
-    /// Whether nothing was named before it in its balance, errors of the speeds left aside: what a name leaves is
-    /// easily that name's own form.
+    /// Whether nothing was named before it in its balance, errors of the speeds left aside, or less than it gains at the
+    /// sensors' noise: what a name leaves is easily that name's own form.
     pub first: bool,
+    /// Whether it is a memory: what was before counts.
+    pub remembers: bool,
     /// Whether its memory is longer than what the chain's own timing was off by.
     pub outlasts_chain: bool,
     /// Readings in the balances that are judged.
@@ -148,6 +150,8 @@ pub struct Before<'a> {
     pub judged: &'a Judged,
     /// What the chain's own timing was off by, in s.
     chain_s: f64,
+    /// What was taken up before gained at the sensors' noise, in nats.
+    taken_up: f64,
     /// Sum of squares of the drag that its best law leaves, by run.
     squares: Vec<f64>,
     /// The noise no larger than the sensors make plausible, and what it says of unseen runs under that.
@@ -155,13 +159,14 @@ pub struct Before<'a> {
 }
 
 impl<'a> Before<'a> {
-    pub fn new(data: &'a Data, judged: &'a Judged, chain_s: f64) -> Self {
+    pub fn new(data: &'a Data, judged: &'a Judged, chain_s: f64, taken_up: f64) -> Self {
         let noise = capped(&judged.parts);
         let unseen = judged.unseen_under(data, &noise);
         Self {
             data,
             judged,
             chain_s,
+            taken_up,
             squares: squares_by_best_law(data, judged),
             at_sensors: (noise, unseen),
         }
@@ -179,7 +184,7 @@ impl<'a> Before<'a> {
         let counts = judged.grams.iter().flatten().map(|g| g.count);
         let readings = counts.sum::<usize>() / judged.parts.len().max(1);
         let balance = claim.balance(data);
-        let first = !base.model.terms.iter().any(|t| {
+        let named = base.model.terms.iter().any(|t| {
             let id = data.catalogue.get(t.entry).id();
             id.balance() == balance && (balance != Balance::Tyre || through_force(id))
         });
@@ -190,26 +195,23 @@ impl<'a> Before<'a> {
             f64::INFINITY
         };
         let at_sensors = self.gained_at_sensors(&judged, per_run);
-        let outlasts_chain = match &claim {
-            Claim::Mechanism(id, entry) => {
-                let least = least_memory_s(data, *id, *entry);
-                let real =
-                    in_force && predicts > REAL_MEMORY_PREDICTED && at_sensors.1 > REAL_MEMORY_T;
-                let chain_s = if real { 0.0 } else { self.chain_s };
-                memory_s(data, *id, *entry, &judged.model)
-                    .is_none_or(|memory| memory > least.max(chain_s))
-            }
-            Claim::Dependence(_) => true,
+        let memory_s = match &claim {
+            Claim::Mechanism(id, entry) => memory_s(data, *id, *entry, &judged.model)
+                .map(|memory| (memory, least_memory_s(data, *id, *entry))),
+            Claim::Dependence(_) => None,
         };
+        let real = in_force && predicts > REAL_MEMORY_PREDICTED && at_sensors.1 > REAL_MEMORY_T;
+        let chain_s = if real { 0.0 } else { self.chain_s };
         let price = PRICE_OF_PARAMETER * free + PRICE_OF_NAME;
         Trial {
             claim,
             gain: base.loss - judged.loss - price,
             price,
             unseen: mean_and_t(&gains(&base.unseen, &judged.unseen, per_run)),
+            first: !named || at_sensors.0 > self.taken_up,
             at_sensors,
-            first,
-            outlasts_chain,
+            remembers: memory_s.is_some(),
+            outlasts_chain: memory_s.is_none_or(|(memory, least)| memory > least.max(chain_s)),
             predicts,
             readings,
             size,
@@ -321,9 +323,19 @@ fn hidden(trial: &Trial) -> bool {
 /// Whether a trial is as good as one that stands but for how alike unseen runs speak for it.
 #[must_use]
 pub fn could_stand(trial: &Trial) -> bool {
+    gains_on_unseen_runs(trial) && could_be_named(trial)
+}
+
+/// Whether unseen runs gain, alike or not.
+fn gains_on_unseen_runs(trial: &Trial) -> bool {
     let (mean, t) = trial.unseen;
-    let gains = trial.gain > LEAST_GAIN && mean > 0.0 && t > LEAST_T_OF_LIKELIER;
-    gains && could_be_named(trial)
+    trial.gain > LEAST_GAIN && mean > 0.0 && t > LEAST_T_OF_LIKELIER
+}
+
+/// Whether a name is of use beside others that were named: whatever it is worth alone was settled when it was taken up.
+#[must_use]
+pub fn needed(trial: &Trial) -> bool {
+    gains_on_unseen_runs(trial) || hidden(trial)
 }
 
 /// Whether unseen runs gain, and alike, where their own differences are no larger than sensors make plausible.

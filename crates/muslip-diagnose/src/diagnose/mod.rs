@@ -10,6 +10,7 @@ use std::collections::BTreeMap;
 use nalgebra::DMatrix;
 
 use self::figures::{fit_of, traces};
+use self::model_out::Predicts;
 use self::named::DELAYS;
 use crate::audit::{Audit, audit};
 use crate::campaign::{Rig, Run};
@@ -242,8 +243,12 @@ impl<'a> Answer<'a> {
             !found.tyre.is_empty() || !found.corrections.is_empty() || !found.late.is_none();
         let base_alone = found.without_findings();
         let worse = fit.holdout.after.rmse_n > fit.holdout.before.rmse_n;
-        let better = says_something && !worse && self.predicts_better(&base_alone, &found);
-        if says_something && !better {
+        let predicts = if says_something && !worse {
+            self.predicts(&base_alone, &found)
+        } else {
+            Predicts::default()
+        };
+        if says_something && !predicts.known {
             for named in &mut mechanisms {
                 if Id::parse(named.id).is_some_and(through_force) {
                     named.evidence.confidence = named.evidence.confidence.min(0.5);
@@ -278,7 +283,11 @@ impl<'a> Answer<'a> {
             fit,
             caveats: self.caveats(kept),
             traces: traces(kept, &predicted, self.data.context.radius),
-            repaired: if better { found.clone() } else { base_alone },
+            repaired: if predicts.unseen {
+                found.clone()
+            } else {
+                base_alone
+            },
             found,
         }
     }
