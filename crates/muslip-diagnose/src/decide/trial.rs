@@ -67,6 +67,8 @@ pub struct Trial {
     /// Whether nothing was named before it in its balance, errors of the speeds left aside, or less than it gains at the
     /// sensors' noise: what a name leaves is easily that name's own form.
     pub first: bool,
+    /// Whether its parameters are the mechanism's own, and not at a limit where its form is another's.
+    pub own: bool,
     /// Whether it is a memory: what was before counts.
     pub remembers: bool,
     /// Whether its memory is longer than what the chain's own timing was off by.
@@ -195,6 +197,14 @@ impl<'a> Before<'a> {
             f64::INFINITY
         };
         let at_sensors = self.gained_at_sensors(&judged, per_run);
+        let own = match &claim {
+            Claim::Mechanism(_, entry) => {
+                let mut terms = judged.model.terms.iter();
+                let term = terms.find(|t| t.entry == *entry);
+                term.is_none_or(|t| data.catalogue.get(*entry).owns(&t.parameters))
+            }
+            Claim::Dependence(_) => true,
+        };
         let memory_s = match &claim {
             Claim::Mechanism(id, entry) => memory_s(data, *id, *entry, &judged.model)
                 .map(|memory| (memory, least_memory_s(data, *id, *entry))),
@@ -210,6 +220,7 @@ impl<'a> Before<'a> {
             unseen: mean_and_t(&gains(&base.unseen, &judged.unseen, per_run)),
             first: !named || at_sensors.0 > self.taken_up,
             at_sensors,
+            own,
             remembers: memory_s.is_some(),
             outlasts_chain: memory_s.is_none_or(|(memory, least)| memory > least.max(chain_s)),
             predicts,
@@ -295,9 +306,10 @@ fn worth(trial: &Trial) -> f64 {
     0.5 * LEAST_EFFECT * LEAST_EFFECT * trial.readings as f64
 }
 
-/// Whether a trial could be named, were it seen: large enough, no memory of the chain's, and better at predicting.
+/// Whether a trial could be named, were it seen: large enough, itself, no memory of the chain's, and better at predicting.
 fn could_be_named(trial: &Trial) -> bool {
-    trial.size > worth(trial) && trial.outlasts_chain && trial.predicts > LEAST_PREDICTED
+    let large = trial.size > worth(trial);
+    large && trial.own && trial.outlasts_chain && trial.predicts > LEAST_PREDICTED
 }
 
 /// Whether a trial stands.

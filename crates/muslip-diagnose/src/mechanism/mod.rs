@@ -362,6 +362,10 @@ pub trait Describe: Send + Sync {
     fn amplitude(&self) -> Option<usize> {
         Some(0)
     }
+    /// Whether these parameters are its own, and not at a limit where its form is another's.
+    fn owns(&self, _parameters: &[f64]) -> bool {
+        true
+    }
     /// Whether it is rare beside what recordings hardly tell it from.
     fn rare(&self) -> bool {
         false

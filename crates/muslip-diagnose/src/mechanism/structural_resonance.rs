@@ -90,6 +90,9 @@ impl Describe for StructuralResonance {
             reported[0].value, reported[1].value
         )
     }
+    fn owns(&self, parameters: &[f64]) -> bool {
+        self.form == Form::Whole || parameters[1] < RINGS * self.most_damping()
+    }
     fn guide(&self) -> Guide {
         Guide {
             physics: "Load cell and mount are a mass on a spring: each change of the force makes them ring at their own frequency until damping has taken it. The mean is right, the oscillation is not the tyre's.",
@@ -120,6 +123,9 @@ impl Describe for StructuralResonance {
         }
     }
 }
+
+/// Share of the most damping up to which a share of the force rings.
+const RINGS: f64 = 0.99;
 
 impl StructuralResonance {
     /// A share that hardly rings is any difference between two filters.
@@ -163,5 +169,17 @@ impl<T: Number> Mechanism<T> for StructuralResonance {
                 value: p[1],
             },
         ]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_share_that_rings_as_little_as_it_may_is_a_filter_s() {
+        let [whole, share] = [Form::Whole, Form::Share].map(|form| StructuralResonance { form });
+        assert!(share.owns(&[20.0, 0.05, 0.4]) && !share.owns(&[20.0, 0.1, 0.4]));
+        assert!(whole.owns(&[20.0, 0.3]));
     }
 }
