@@ -113,8 +113,9 @@ pub const AUDITED: f64 = 2.0;
 
 /// Least mean logarithm by which a repaired model lowers the square of a prediction's error: less is chance.
 pub const LEAST_GAIN_OF_PREDICTION: f64 = 0.02;
-/// Factor on the square of a recording's error that is still no worse: one percent, as the bench has it. (How sure the
-/// gain has to be is one standard deviation of what the next recording gains.)
+/// Standard deviations of what the next recording gains by which the mean gain has to exceed nothing.
+pub const LEAST_STDS_GAINED: f64 = 1.0;
+/// Factor on the square of a recording's error that is still no worse: one percent, as the bench has it.
 pub const MOST_WORSE: f64 = 1.01;
 /// Fewest samples of a run from which its tyre balance says anything.
 pub const LEAST_OF_TYRE: usize = 30;

@@ -191,6 +191,15 @@ impl<const N: usize> Number for Dual<N> {
     }
 }
 
+/// Mean, and standard deviation of one value about it: nought of a single one, not a number of none.
+#[must_use]
+pub fn mean_and_std(values: &[f64]) -> (f64, f64) {
+    let n = values.len() as f64;
+    let mean = values.iter().sum::<f64>() / n;
+    let squares: f64 = values.iter().map(|x| (x - mean).powi(2)).sum();
+    (mean, (squares / (n - 1.0).max(1.0)).sqrt())
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

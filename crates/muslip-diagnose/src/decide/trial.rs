@@ -13,7 +13,7 @@ use crate::innovations::hypothesis::{Judged, Unseen, capped};
 use crate::innovations::noise::BalanceParts;
 use crate::law::{closest, left_of};
 use crate::mechanism::{Balance, Id};
-use crate::model::Model;
+use crate::number::mean_and_std;
 
 /// What a trial adds to a model.
 #[derive(Clone)]
@@ -25,6 +25,14 @@ pub enum Claim {
 }
 
 impl Claim {
+    /// The mechanism and its entry, where it is one.
+    fn mechanism(&self) -> Option<(Id, usize)> {
+        match self {
+            Self::Mechanism(id, entry) => Some((*id, *entry)),
+            Self::Dependence(_) => None,
+        }
+    }
+
     /// The balance that it is of.
     pub fn balance(&self, data: &Data) -> Balance {
         match self {
@@ -89,10 +97,7 @@ impl Trial {
     /// The mechanism, where it is one.
     #[must_use]
     pub fn mechanism(&self) -> Option<(Id, usize)> {
-        match &self.claim {
-            Claim::Mechanism(id, entry) => Some((*id, *entry)),
-            Claim::Dependence(_) => None,
-        }
+        self.claim.mechanism()
     }
 
     /// How much speaks for it at both levels of the noise: the geometric mean of its gains. Fitted noise that is
@@ -131,11 +136,10 @@ fn mean_and_t(gains: &[f64]) -> (f64, f64) {
     if gains.is_empty() {
         return (0.0, 0.0);
     }
-    let mean = gains.iter().sum::<f64>() / n;
+    let (mean, spread) = mean_and_std(gains);
     if gains.len() < 2 {
         return (mean, if mean > 0.0 { LEAST_T } else { 0.0 });
     }
-    let spread = (gains.iter().map(|g| (g - mean).powi(2)).sum::<f64>() / (n - 1.0)).sqrt();
     (mean, mean / spread.max(1e-9) * n.sqrt())
 }
 
@@ -197,19 +201,14 @@ impl<'a> Before<'a> {
             f64::INFINITY
         };
         let at_sensors = self.gained_at_sensors(&judged, per_run);
-        let own = match &claim {
-            Claim::Mechanism(_, entry) => {
-                let mut terms = judged.model.terms.iter();
-                let term = terms.find(|t| t.entry == *entry);
-                term.is_none_or(|t| data.catalogue.get(*entry).owns(&t.parameters))
-            }
-            Claim::Dependence(_) => true,
-        };
-        let memory_s = match &claim {
-            Claim::Mechanism(id, entry) => memory_s(data, *id, *entry, &judged.model)
-                .map(|memory| (memory, least_memory_s(data, *id, *entry))),
-            Claim::Dependence(_) => None,
-        };
+        let term = claim.mechanism().and_then(|(id, entry)| {
+            let term = judged.model.terms.iter().find(|t| t.entry == entry)?;
+            Some((id, entry, term.parameters.as_slice()))
+        });
+        let own = term.is_none_or(|(_, entry, p)| data.catalogue.get(entry).owns(p));
+        let memory_s = term.and_then(|(id, entry, p)| {
+            Some((memory_s(data, id, p)?, least_memory_s(data, id, entry)))
+        });
         let real = in_force && predicts > REAL_MEMORY_PREDICTED && at_sensors.1 > REAL_MEMORY_T;
         let chain_s = if real { 0.0 } else { self.chain_s };
         let price = PRICE_OF_PARAMETER * free + PRICE_OF_NAME;
@@ -284,15 +283,14 @@ fn least_memory_s(data: &Data, id: Id, entry: usize) -> f64 {
 }
 
 /// Memory of a mechanism in s, where it has one.
-fn memory_s(data: &Data, id: Id, entry: usize, model: &Model) -> Option<f64> {
-    let term = model.terms.iter().find(|t| t.entry == entry)?;
-    let first = *term.parameters.first()?;
+fn memory_s(data: &Data, id: Id, parameters: &[f64]) -> Option<f64> {
+    let first = *parameters.first()?;
     match id {
         Id::BrakeLag | Id::ForceLag | Id::ForceDelay => Some(first),
         Id::RelaxationLength => Some(first / data.context.mean_speed),
         Id::StructuralResonance => {
             let omega = core::f64::consts::TAU * first;
-            let damping = term.parameters.get(1).copied().unwrap_or(1.0);
+            let damping = parameters.get(1).copied().unwrap_or(1.0);
             // What rings remembers as long as it rings.
             let rings = damping < RINGING;
             Some(1.0 / (omega * if rings { damping } else { 1.0 }))

@@ -5,11 +5,11 @@ use nalgebra::DMatrix;
 use super::Answer;
 use crate::campaign::Run;
 use crate::chain::correct::Lateness;
-use crate::constants::{LEAST_GAIN_OF_PREDICTION, MOST_WORSE};
+use crate::constants::{LEAST_GAIN_OF_PREDICTION, LEAST_STDS_GAINED, MOST_WORSE};
 use crate::law::closest;
 use crate::mechanism::Stage;
 use crate::model::{Model, TYRE_BASE};
-use crate::number::finite_or_zero;
+use crate::number::{finite_or_zero, mean_and_std};
 use crate::prepare::Series;
 use crate::repaired::{Domain, KnownRecording, NoiseModel, Repaired, RepairedTerm, Which};
 
@@ -180,17 +180,12 @@ pub(super) struct Predicts {
 }
 
 /// Whether logarithms of the squared error's ratio, one a recording, show a gain: on the whole, no loss on any of them,
-/// and spread so little that the next recording gains too unless it lies further off than one standard deviation.
+/// and spread so little that the next recording gains too unless it lies further off than some standard deviations.
 fn surely_gained(gains: &[f64]) -> bool {
-    let n = gains.len() as f64;
-    let mean = gains.iter().sum::<f64>() / n;
-    let next = if gains.len() > 1 {
-        let squares: f64 = gains.iter().map(|g| (g - mean).powi(2)).sum();
-        (squares / (n - 1.0) * (1.0 + 1.0 / n)).sqrt()
-    } else {
-        0.0
-    };
-    mean > LEAST_GAIN_OF_PREDICTION.max(next) && gains.iter().all(|g| *g > -MOST_WORSE.ln())
+    let (mean, std) = mean_and_std(gains);
+    let next = std * (1.0 + 1.0 / gains.len() as f64).sqrt();
+    let sure = mean > LEAST_GAIN_OF_PREDICTION.max(LEAST_STDS_GAINED * next);
+    sure && gains.iter().all(|g| *g > -MOST_WORSE.ln())
 }
 
 /// Mean square of the error of a predicted drag.
