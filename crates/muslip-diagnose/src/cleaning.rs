@@ -2,7 +2,7 @@
 
 use core::ops::Range;
 
-use crate::prepare::DataFault;
+use crate::series::DataFault;
 use crate::smooth::difference_sigma;
 
 /// Anything larger is no measurement.

@@ -8,9 +8,10 @@ use crate::audit::colour::Colour;
 use crate::campaign::{Rig, Run};
 use crate::chain::correct::TimingStd;
 use crate::innovations::blocks::Blocks;
-use crate::mechanism::{Balance, Before, Context, Mechanism, catalogue};
+use crate::mechanism::{Balance, Before, Context, Id, Mechanism, catalogue};
 use crate::number::{Dual, Number};
-use crate::prepare::{DataFault, LawProducts, MOST_REACH, Series, prepare};
+use crate::prepare::{MOST_REACH, prepare};
+use crate::series::{DataFault, LawProducts, Series};
 use crate::smooth::median_in_place;
 
 /// Width of the dual numbers: parameters differentiated in one pass.
@@ -36,6 +37,18 @@ impl Catalogue {
     #[must_use]
     pub fn entries(&self) -> &[Box<dyn Mechanism<f64>>] {
         &self.plain
+    }
+    /// The first entry of this mechanism.
+    #[must_use]
+    pub fn of(&self, id: Id) -> Option<&dyn Mechanism<f64>> {
+        let mut entries = self.plain.iter();
+        entries.find(|m| m.id() == id).map(AsRef::as_ref)
+    }
+    /// Mechanisms that are the lateness of a speed.
+    #[must_use]
+    pub fn delays(&self) -> Vec<Id> {
+        let late = self.plain.iter().filter(|m| m.late().is_some());
+        late.map(|m| m.id()).collect()
     }
     /// One entry in plain numbers.
     #[must_use]

@@ -1,78 +1,21 @@
 //! What wheel and vehicle lack without one of their mechanisms, sample by sample: the picture of its effect.
 
 use crate::campaign::Run;
-use crate::mechanism::{Balance, Id};
+use crate::mechanism::{Against, Balance};
 use crate::model::{Model, vehicle, wheel};
-use crate::prepare::Series;
 use crate::repaired::{Repaired, RepairedError, Which};
+use crate::series::Series;
 
-/// What an effect is a function of.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Against {
-    /// Time in s: the effect has a memory.
-    Time,
-    /// Vehicle speed in m/s.
-    VehicleSpeed,
-    /// Wheel speed in rad/s.
-    WheelSpeed,
-    /// Normal force in N.
-    NormalForce,
-    /// Drag reading in N.
-    Drag,
-    /// Vehicle acceleration in m/s².
-    VehicleAcceleration,
-    /// Wheel acceleration in rad/s².
-    WheelAcceleration,
-}
-
-impl Against {
-    fn of(id: Id, form: &str) -> Self {
-        match (id, form) {
-            (Id::AeroDrag | Id::GradeOrDrive, _) => Self::VehicleSpeed,
-            (Id::VehicleInertia, _) => Self::VehicleAcceleration,
-            (Id::WheelInertia, _) => Self::WheelAcceleration,
-            (Id::ForceGain, _) => Self::Drag,
-            (Id::BearingDrag, "with_load") => Self::NormalForce,
-            (Id::BearingDrag, _) => Self::WheelSpeed,
-            (Id::BrakeFade | Id::BrakeLag, _) => Self::Time,
-            // Of the tyre's balance: none of these is drawn by what wheel or vehicle lack.
-            (
-                Id::CurveShape
-                | Id::LoadSensitivity
-                | Id::SpeedSensitivity
-                | Id::ThermalFade
-                | Id::RelaxationLength
-                | Id::RollingResistance
-                | Id::EffectiveRadius
-                | Id::SurfacePatch
-                | Id::WearDrift
-                | Id::SlipHysteresis
-                | Id::ForceDelay
-                | Id::ForceLag
-                | Id::StructuralResonance
-                | Id::InertialReaction
-                | Id::LoadCrosstalk
-                | Id::ZeroDrift
-                | Id::ForceSaturation
-                | Id::RunOut
-                | Id::EncoderRipple
-                | Id::VehicleSpeedDelay
-                | Id::WheelSpeedDelay,
-                _,
-            ) => Self::Time,
-        }
-    }
-
-    fn values(self, series: &Series) -> &[f64] {
-        match self {
-            Self::Time => &series.time,
-            Self::VehicleSpeed => &series.speed.smooth,
-            Self::WheelSpeed => &series.wheel.smooth,
-            Self::NormalForce => &series.load.smooth,
-            Self::Drag => &series.drag_smooth,
-            Self::VehicleAcceleration => &series.speed.rate,
-            Self::WheelAcceleration => &series.wheel.rate,
-        }
+/// The channel that an effect is drawn over.
+fn channel(against: Against, series: &Series) -> &[f64] {
+    match against {
+        Against::Time => &series.time,
+        Against::VehicleSpeed => &series.speed.smooth,
+        Against::WheelSpeed => &series.wheel.smooth,
+        Against::NormalForce => &series.load.smooth,
+        Against::Drag => &series.drag_smooth,
+        Against::VehicleAcceleration => &series.speed.rate,
+        Against::WheelAcceleration => &series.wheel.rate,
     }
 }
 
@@ -107,7 +50,7 @@ impl Repaired {
     /// # Errors
     /// [`RepairedError`] where the model cannot be run.
     pub fn imbalance(&self, run: &Run, place: usize) -> Result<Option<Imbalance>, RepairedError> {
-        let Some(term) = self.dynamics.get(place) else {
+        if self.dynamics.get(place).is_none() {
             return Ok(None);
         };
         let data = self.prepared(run);
@@ -115,8 +58,8 @@ impl Repaired {
         let with = self.dynamics_model(&data.catalogue)?;
         let mut without = with.clone();
         without.terms.remove(place);
-        let id = data.catalogue.get(with.terms[place].entry).id();
-        let (balance, usable) = match id.balance() {
+        let mechanism = data.catalogue.get(with.terms[place].entry);
+        let (balance, usable) = match mechanism.id().balance() {
             Balance::Vehicle if !series.vehicle_balance.is_empty() => {
                 (Balance::Vehicle, &series.vehicle_balance)
             }
@@ -136,8 +79,8 @@ impl Repaired {
             }
         };
         let (left, lacking) = (of(&with), of(&without));
-        let against = Against::of(id, &term.form);
-        let at = against.values(series);
+        let against = mechanism.drawn_over();
+        let at = channel(against, series);
         let stretches = usable
             .iter()
             .map(|stretch| {

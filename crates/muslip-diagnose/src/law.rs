@@ -5,7 +5,7 @@ use crate::data::Data;
 use crate::innovations::candidates::slopes_in;
 use crate::innovations::rows::rows_of;
 use crate::model::Model;
-use crate::prepare::{LawProducts, Series};
+use crate::series::{LawProducts, Series};
 
 /// Steps to the best parameters.
 const STEPS: usize = 8;

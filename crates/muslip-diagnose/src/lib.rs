@@ -8,7 +8,7 @@
 //!
 //! | step | module |
 //! | --- | --- |
-//! | what is given | [`campaign`], `cleaning`, [`prepare`], `smooth`, [`data`] |
+//! | what is given | [`campaign`], `cleaning`, [`prepare`], `smooth`, [`series`], [`data`] |
 //! | what is kept for the proof | `split` |
 //! | the measuring chain | [`audit`], [`chain`] |
 //! | the simulation and its balances | [`model`], [`mechanism`], [`number`] |
@@ -27,10 +27,12 @@
 )]
 
 pub mod audit;
+mod balance;
 pub mod campaign;
 pub mod chain;
 mod cleaning;
 mod constants;
+mod context;
 pub mod correction;
 pub mod data;
 mod decide;
@@ -50,6 +52,7 @@ pub mod prepare;
 pub mod proof;
 pub mod repaired;
 mod separating;
+pub mod series;
 mod smooth;
 mod split;
 mod turn;

@@ -1,8 +1,8 @@
 //! The simulation: the base law with any set of mechanisms, run on one recording.
 
 use crate::data::{Catalogue, Listed};
-use crate::mechanism::{Context, Id, Law, Stage, State};
-use crate::prepare::Series;
+use crate::mechanism::{Context, Law, Stage, State};
+use crate::series::Series;
 
 /// Parameters that every tyre model has: logarithms of peak friction and slip at the peak, and three
 /// shares that say how the inputs are to be read between raw and smoothed (no physics: see `prepare`).
@@ -209,19 +209,8 @@ pub fn tyre<T: Listed>(
     {
         state.contact = Some(state.force.clone());
         run(Stage::Reading, &mut state);
-        // Order of the chain: the structure rings, the filter lags, the line delays, the input clips.
-        for id in [
-            Id::StructuralResonance,
-            Id::ForceLag,
-            Id::ForceDelay,
-            Id::ForceSaturation,
-        ] {
-            for (entry, own) in &terms {
-                let mechanism = T::entry(catalogue, *entry);
-                if mechanism.id() == id {
-                    mechanism.apply(own, series, context, &mut state);
-                }
-            }
+        for stage in [Stage::Structure, Stage::Filter, Stage::Line, Stage::Input] {
+            run(stage, &mut state);
         }
     }
     state
@@ -247,7 +236,7 @@ pub fn wheel<T: Listed>(
     state.brake = torque.smooth.iter().map(|t| T::constant(*t)).collect();
     for (entry, own) in split(model, p) {
         let mechanism = T::entry(catalogue, entry);
-        if mechanism.stage() == Stage::Wheel || mechanism.id() == Id::ForceGain {
+        if mechanism.acts_at(Stage::Wheel) {
             mechanism.apply(own, series, context, &mut state);
         }
     }
@@ -292,7 +281,7 @@ pub fn vehicle<T: Listed>(
     state.opposing = vec![T::constant(0.0); n];
     for (entry, own) in split(model, p) {
         let mechanism = T::entry(catalogue, entry);
-        if mechanism.stage() == Stage::Vehicle {
+        if mechanism.acts_at(Stage::Vehicle) {
             mechanism.apply(own, series, context, &mut state);
         }
     }

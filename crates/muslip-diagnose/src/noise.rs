@@ -272,6 +272,27 @@ pub fn chi_square_upper(x: f64, degrees: f64) -> f64 {
     ChiSquared::new(degrees).map_or(1.0, |d| d.sf(x))
 }
 
+/// What a likelihood of drag readings needs beside the model's prediction.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Likelihood {
+    /// Size of the noise of one sample.
+    pub size: NoiseSize,
+    /// Autoregressive coefficients of the noise over its size, at the fitted sampling step.
+    pub colour: Vec<f64>,
+    /// Standard deviation of the innovations over that size.
+    pub innovation_sigma: f64,
+}
+
+impl Likelihood {
+    /// What makes residuals over their size white.
+    pub(crate) fn whitener(&self) -> Whitener {
+        Whitener {
+            ar: self.colour.clone(),
+            sigma: self.innovation_sigma,
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -7,8 +7,8 @@ use serde::Serialize;
 pub use crate::audit::finding::{Finding as ChainFinding, Word as ChainWord};
 use crate::mechanism::Reported;
 use crate::number::finite_or_zero;
-use crate::prepare::DataFault;
 use crate::repaired::Repaired;
+use crate::series::DataFault;
 
 /// The one word of the verdict.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]

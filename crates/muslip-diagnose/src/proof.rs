@@ -4,65 +4,46 @@
 use core::ops::Range;
 
 use rayon::prelude::*;
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 
 use crate::campaign::Run;
 use crate::mechanism::Context;
-use crate::noise::{NoiseSize, Whitener, loss, whiteness};
+use crate::noise::{Likelihood, NoiseSize, Whitener, loss, whiteness};
 use crate::number::finite_or_zero;
 use crate::outcome::{BeforeAfter, Score};
-use crate::prepare::{Series, prepare};
+use crate::prepare::prepare;
 use crate::repaired::{Repaired, RepairedError, Which};
+use crate::series::Series;
 use crate::split;
 
-/// What a likelihood of drag readings needs beside the model's prediction.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Likelihood {
-    /// Size of the noise of one sample.
-    pub size: NoiseSize,
-    /// Autoregressive coefficients of the noise over its size, at the fitted sampling step.
-    pub colour: Vec<f64>,
-    /// Standard deviation of the innovations over that size.
-    pub innovation_sigma: f64,
-}
-
-impl Likelihood {
-    /// Of what the repaired model leaves of what it was fitted to; `None` without a sample.
-    fn fitted(runs: &[Predicted], context: &Context) -> Option<Self> {
-        let (mut rest, mut depends_on) = (Vec::new(), Vec::new());
-        for (run, k) in runs.iter().flat_map(|run| run.samples(Kind::Fit)) {
-            rest.push(run.series.drag[k] - run.after[k]);
-            depends_on.push([run.after[k], run.series.slip_force_noise(k, context)]);
-        }
-        if rest.is_empty() {
-            return None;
-        }
-        let size = NoiseSize::fitted(&rest, &depends_on);
-        // All runs as one, so that one autoregression is fitted to them.
-        let (mut all, mut segments) = (Vec::new(), Vec::new());
-        for run in runs {
-            let offset = all.len();
-            segments.extend(
-                run.segments(Kind::Fit)
-                    .map(|s| s.start + offset..s.end + offset),
-            );
-            let scaled = run.sizes(&size, context).zip(run.left(&run.after));
-            all.extend(scaled.map(|(size, left)| left / size));
-        }
-        let whitener = Whitener::fit(&all, &segments);
-        Some(Self {
-            size,
-            colour: whitener.ar,
-            innovation_sigma: whitener.sigma,
-        })
+/// Likelihood by what the repaired model leaves of what it was fitted to; `None` without a sample.
+fn likelihood_of(runs: &[Predicted], context: &Context) -> Option<Likelihood> {
+    let (mut rest, mut depends_on) = (Vec::new(), Vec::new());
+    for (run, k) in runs.iter().flat_map(|run| run.samples(Kind::Fit)) {
+        rest.push(run.series.drag[k] - run.after[k]);
+        depends_on.push([run.after[k], run.series.slip_force_noise(k, context)]);
     }
-
-    fn whitener(&self) -> Whitener {
-        Whitener {
-            ar: self.colour.clone(),
-            sigma: self.innovation_sigma,
-        }
+    if rest.is_empty() {
+        return None;
     }
+    let size = NoiseSize::fitted(&rest, &depends_on);
+    // All runs as one, so that one autoregression is fitted to them.
+    let (mut all, mut segments) = (Vec::new(), Vec::new());
+    for run in runs {
+        let offset = all.len();
+        segments.extend(
+            run.segments(Kind::Fit)
+                .map(|s| s.start + offset..s.end + offset),
+        );
+        let scaled = run.sizes(&size, context).zip(run.left(&run.after));
+        all.extend(scaled.map(|(size, left)| left / size));
+    }
+    let whitener = Whitener::fit(&all, &segments);
+    Some(Likelihood {
+        size,
+        colour: whitener.ar,
+        innovation_sigma: whitener.sigma,
+    })
 }
 
 /// Figures of recordings by what the model's maker did with them; `None` where none of a kind was given.
@@ -222,7 +203,7 @@ impl Repaired {
     /// Gives the model the noise of the drag readings that it leaves of what it was fitted to; none where that says
     /// nothing of the tyre balance.
     pub(crate) fn set_noise(&mut self, runs: &[Predicted]) {
-        self.noise.likelihood = Likelihood::fitted(runs, &self.context);
+        self.noise.likelihood = likelihood_of(runs, &self.context);
         if let Some(likelihood) = &self.noise.likelihood {
             self.noise.sigma_n = likelihood.size.typical;
         }

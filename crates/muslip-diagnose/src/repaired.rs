@@ -11,8 +11,9 @@ use crate::correction::{Action, Levers, hat};
 use crate::data::{Catalogue, Data};
 use crate::mechanism::{Context, Parameter};
 use crate::model::{Model, Term, tyre};
-use crate::prepare::{Series, prepare};
-use crate::proof::Likelihood;
+use crate::noise::Likelihood;
+use crate::prepare::prepare;
+use crate::series::Series;
 use crate::variable::Variable;
 
 /// A mechanism with its parameters.

@@ -6,7 +6,7 @@
 use core::ops::Range;
 
 use crate::data::Data;
-use crate::prepare::Series;
+use crate::series::Series;
 use crate::smooth::median_in_place;
 
 /// The split of a campaign; by default nothing is kept.

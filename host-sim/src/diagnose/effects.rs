@@ -2,8 +2,8 @@
 
 use muslip_diagnose::campaign::Run;
 use muslip_diagnose::chain::correct::Lateness;
-use muslip_diagnose::imbalance::{Against, Imbalance, Instant};
-use muslip_diagnose::mechanism::{Balance, Id};
+use muslip_diagnose::imbalance::{Imbalance, Instant};
+use muslip_diagnose::mechanism::{Against, Balance, Id};
 use muslip_diagnose::outcome::Diagnosis;
 use muslip_diagnose::repaired::{Correction, Repaired, Which};
 

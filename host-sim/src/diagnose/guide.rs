@@ -322,7 +322,7 @@ fn picture(id: Id, plain: &Repaired, run: &Run, scenario: &Scenario) -> Result<F
     };
     let mut model = plain.clone();
     let mut run = run.clone();
-    if entry.stage() <= Stage::Chain {
+    if entry.stage() < Stage::Vehicle {
         model.tyre.push(term);
         run.drag_force_n = model.predict(&run, Which::Repaired)?.drag_force_n;
     } else {

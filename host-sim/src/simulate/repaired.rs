@@ -15,10 +15,11 @@ use muslip::law::Rudd;
 use muslip_diagnose::campaign::Run;
 use muslip_diagnose::correction::{Action, Levers};
 use muslip_diagnose::data::{Catalogue, Data};
-use muslip_diagnose::mechanism::{Id, Mechanism, Stage, State};
+use muslip_diagnose::mechanism::{Mechanism, Stage, State};
 use muslip_diagnose::model::{Model, tyre};
-use muslip_diagnose::prepare::{Channel as Prepared, Series};
 use muslip_diagnose::repaired::{Repaired, RepairedError, Which};
+use muslip_diagnose::series::Channel as Prepared;
+use muslip_diagnose::series::Series;
 
 use super::model_noise::DragNoise;
 use super::{
@@ -312,7 +313,7 @@ impl<'a> Coupling<'a> {
             .unwrap_or_default();
         for term in &self.dynamics.terms {
             let mechanism: &dyn Mechanism<f64> = self.data.catalogue.get(term.entry);
-            if mechanism.stage() == stage || mechanism.id() == Id::ForceGain {
+            if mechanism.acts_at(stage) {
                 mechanism.apply(&term.parameters, series, &self.data.context, &mut state);
             }
         }

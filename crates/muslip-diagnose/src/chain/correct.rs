@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::held::without_holds;
 use crate::campaign::Run;
-use crate::prepare::GAP_STEPS;
+use crate::series::GAP_STEPS;
 
 /// By how much each channel is late against the drag channel, in s.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]

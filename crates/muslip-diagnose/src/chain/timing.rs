@@ -14,7 +14,7 @@ use crate::innovations::gram::{solve, total};
 use crate::innovations::hypothesis::{Effort, Guess, Judged, judge, noise_stride};
 use crate::innovations::slip::reconciled;
 use crate::model::Model;
-use crate::prepare::{Channel, Series};
+use crate::series::{Channel, Series};
 use crate::split::Split;
 
 /// How late the channels are against the drag channel, with what is not known of it.
@@ -141,28 +141,107 @@ pub fn averaging(runs: &[Run]) -> usize {
     by_step * by_size.min(most).max(huge)
 }
 
-/// The campaign with its channels brought to the drag's time; what was held is drawn as lines already.
-fn at_one_time(
-    rig: &Rig,
-    runs: &[Run],
+/// A campaign as it was recorded: what was held is drawn as lines, neighbours are averaged.
+struct Recorded<'a> {
+    rig: &'a Rig,
+    runs: Vec<Run>,
     averaged: usize,
-    late: Lateness,
-    audit: &Audit,
-    split: &Split,
-) -> Data {
-    let corrected: Vec<Run> = runs
-        .iter()
-        .map(|r| late.shifted(r).only(&late.known(r)))
-        .collect();
-    let mut data = Data::new(rig, &corrected);
-    data.averaged = averaged;
-    split.take_out(&mut data.series);
-    data.blocks = blocks(&data);
-    data.timing_std = known_to(audit);
-    data.vehicle_late = late.vehicle;
-    data.vehicle_colour = audit.vehicle_colour;
-    data.vehicle_filtered = audit.vehicle_filtered();
-    data
+    audit: &'a Audit,
+    split: &'a Split,
+}
+
+impl Recorded<'_> {
+    /// The same with its channels brought to the drag's time.
+    fn at_one_time(&self, late: Lateness) -> Data {
+        let shifted = self
+            .runs
+            .iter()
+            .map(|r| late.shifted(r).only(&late.known(r)));
+        let corrected: Vec<Run> = shifted.collect();
+        let mut data = Data::new(self.rig, &corrected);
+        data.averaged = self.averaged;
+        self.split.take_out(&mut data.series);
+        data.blocks = blocks(&data.series);
+        data.timing_std = known_to(self.audit);
+        data.vehicle_late = late.vehicle;
+        data.vehicle_colour = self.audit.vehicle_colour;
+        data.vehicle_filtered = self.audit.vehicle_filtered();
+        data
+    }
+
+    /// What is left to physics once the timing is found: a drag later than all others, or a brake's reading before its
+    /// torque, is to be told apart (delay, lag or what else keeps it back), so the channels are put back by that much.
+    fn left_to_physics(
+        &self,
+        data: Data,
+        judged: Judged,
+        mut timing: Timing,
+        effort: Effort,
+    ) -> Option<(Data, Timing, Judged)> {
+        timing.found = timing.late;
+        let drag = timing.drag_late();
+        timing.leave(drag.unwrap_or(0.0));
+        let brake = timing.brake_early();
+        if brake {
+            timing.leave_brake();
+        }
+        let (mut data, mut judged) = (data, judged);
+        if drag.is_some() || brake {
+            data = self.at_one_time(timing.late);
+            // What is to be explained is not to be explained away: a drag that two others say is late, or a brake.
+            let both = drag.is_some() && timing.brake.std < VAGUE_S;
+            if both {
+                data.timing_std.wheel = LEAST_STD_S;
+            }
+            if both || brake {
+                data.timing_std.brake = LEAST_STD_S;
+            }
+            let like = Some(Guess::of(&judged.parts));
+            judged = judge(&data, &judged.model, &[], like, effort)?;
+        }
+        let data = reconciled(data, &judged);
+        let like = Some(Guess::of(&judged.parts));
+        let judged = judge(&data, &judged.model, &[], like, effort)?;
+        Some((data, timing, judged))
+    }
+}
+
+impl Timing {
+    /// Takes over how late the channels are by shifts that are still asked for; a shift by a rate that is mostly noise
+    /// says less than the audit does.
+    fn asked(&mut self, audit: &Audit, shift: [f64; 4], std: [f64; 3]) {
+        let late = self.late;
+        let value = |known: &Late, value: f64, std: f64| Late {
+            value: within(known, value),
+            std,
+        };
+        let wheel = late.wheel + late.wheel_by_turn + shift[0] + shift[3];
+        self.wheel = value(&audit.wheel_late, wheel, std[0]);
+        self.vehicle = value(&audit.vehicle_late, late.vehicle + shift[1], std[1]);
+        self.brake = value(&audit.brake_late, late.brake + shift[2], std[2]);
+    }
+
+    /// Moves the channels by these shifts, as far as one pass may.
+    fn moved(&mut self, audit: &Audit, shift: [f64; 4]) {
+        let step = |s: f64| {
+            if s.is_finite() {
+                s.clamp(-MOST_SHIFT_S, MOST_SHIFT_S)
+            } else {
+                0.0
+            }
+        };
+        let late = &mut self.late;
+        late.wheel += step(shift[0]);
+        late.vehicle += step(shift[1]);
+        late.brake += step(shift[2]);
+        // A ring's period delays, never hastens.
+        late.wheel_by_turn = (late.wheel_by_turn + step(shift[3])).max(0.0);
+        // What the audit knows is not given up for what a law, still wrong, would like.
+        let by_turn = late.wheel_by_turn;
+        late.wheel = within(&audit.wheel_late, late.wheel + by_turn) - by_turn;
+        late.vehicle = within(&audit.vehicle_late, late.vehicle);
+        late.brake = within(&audit.brake_late, late.brake);
+    }
 }
 
 /// Samples that enter a balance.
@@ -211,10 +290,14 @@ pub fn timed(
     start: Option<&Timing>,
 ) -> Option<(Data, Timing, Judged)> {
     let averaged = averaging(runs);
-    let runs: Vec<Run> = runs
-        .iter()
-        .map(|r| without_holds(r).averaged(averaged))
-        .collect();
+    let plain = runs.iter().map(|r| without_holds(r).averaged(averaged));
+    let recorded = Recorded {
+        rig,
+        runs: plain.collect(),
+        averaged,
+        audit,
+        split,
+    };
     let mut timing = Timing::default();
     let known = |t: &Late| if t.std.is_finite() { t.value } else { 0.0 };
     match start {
@@ -228,7 +311,7 @@ pub fn timed(
     let mut model = Model::of_law(rig.peak_friction, rig.critical_slip);
     let mut guess = None;
     for pass in 0..=PASSES {
-        let data = at_one_time(rig, &runs, averaged, timing.late, audit, split);
+        let data = recorded.at_one_time(timing.late);
         if usable(&data) < LEAST_USABLE {
             return None;
         }
@@ -242,76 +325,14 @@ pub fn timed(
         let before = guess.as_deref().map(Guess::of);
         let judged = judge(&data, &model, &[], before, effort)?;
         let (shift, std) = shifts(&data, &judged)?;
-        let late = &timing.late;
-        // A shift by a rate that is mostly noise says less than the audit does.
-        let [wheel, vehicle, brake] = [
-            within(
-                &audit.wheel_late,
-                late.wheel + late.wheel_by_turn + shift[0] + shift[3],
-            ),
-            within(&audit.vehicle_late, late.vehicle + shift[1]),
-            within(&audit.brake_late, late.brake + shift[2]),
-        ];
-        timing.wheel = Late {
-            value: wheel,
-            std: std[0],
-        };
-        timing.vehicle = Late {
-            value: vehicle,
-            std: std[1],
-        };
-        timing.brake = Late {
-            value: brake,
-            std: std[2],
-        };
+        timing.asked(audit, shift, std);
         model = judged.model.clone();
         let small = shift.iter().all(|s| s.abs() < SMALL_SHIFT_S);
         if last || (small && pass >= 2) {
-            // A drag later than all others, or a brake's reading before its torque, is physics to be told apart:
-            // delay, lag or what else keeps it back.
-            timing.found = timing.late;
-            let drag = timing.drag_late();
-            timing.leave(drag.unwrap_or(0.0));
-            let brake = timing.brake_early();
-            if brake {
-                timing.leave_brake();
-            }
-            let (mut data, mut judged) = (data, judged);
-            if drag.is_some() || brake {
-                data = at_one_time(rig, &runs, averaged, timing.late, audit, split);
-                // What is to be explained is not to be explained away: a drag that two others say is late, or a brake.
-                let both = drag.is_some() && timing.brake.std < VAGUE_S;
-                if both {
-                    data.timing_std.wheel = LEAST_STD_S;
-                }
-                if both || brake {
-                    data.timing_std.brake = LEAST_STD_S;
-                }
-                judged = judge(&data, &model, &[], Some(Guess::of(&judged.parts)), effort)?;
-            }
-            let data = reconciled(data, &judged);
-            let before = Some(Guess::of(&judged.parts));
-            let judged = judge(&data, &judged.model, &[], before, effort)?;
-            return Some((data, timing, judged));
+            return recorded.left_to_physics(data, judged, timing, effort);
         }
         guess = Some(judged.parts);
-        let step = |s: f64| {
-            if s.is_finite() {
-                s.clamp(-MOST_SHIFT_S, MOST_SHIFT_S)
-            } else {
-                0.0
-            }
-        };
-        timing.late.wheel += step(shift[0]);
-        timing.late.vehicle += step(shift[1]);
-        timing.late.brake += step(shift[2]);
-        // A ring's period delays, never hastens.
-        timing.late.wheel_by_turn = (timing.late.wheel_by_turn + step(shift[3])).max(0.0);
-        // What the audit knows is not given up for what a law, still wrong, would like.
-        let by_turn = timing.late.wheel_by_turn;
-        timing.late.wheel = within(&audit.wheel_late, timing.late.wheel + by_turn) - by_turn;
-        timing.late.vehicle = within(&audit.vehicle_late, timing.late.vehicle);
-        timing.late.brake = within(&audit.brake_late, timing.late.brake);
+        timing.moved(audit, shift);
     }
     None
 }

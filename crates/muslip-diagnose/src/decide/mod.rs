@@ -8,7 +8,7 @@ use finalists::{Screen, effort};
 use rank::rank;
 pub use rank::softness;
 use trial::{Before, could_stand, left_open, needed};
-pub use trial::{Claim, Trial, stands, through_force};
+pub use trial::{Claim, Trial, stands};
 
 use crate::constants::{ALIKE_NATS, DEPENDENCE_NATS, DEPENDENCE_SHARE, FORM_LEFT};
 use crate::data::Data;
@@ -222,60 +222,72 @@ fn at_noise_of(data: &Data, so_far: &Judged, trial: &Trial) -> Option<Judged> {
     (again.loss < so_far.loss - ALIKE_NATS).then_some(again)
 }
 
+/// Judges a model anew from the noise of one that is like it.
+fn again(data: &Data, model: &Model, extra: &[Dependence], like: &Judged) -> Option<Judged> {
+    let guess = Some(Guess::of(&like.parts));
+    judge(data, model, extra, guess, effort(data))
+}
+
 /// Takes names out that the others do not need. A free dependence is no other name: it may span any of them.
-fn without_idle(data: &Data, mut chosen: Judged, chain_s: f64) -> Judged {
-    let judged = |model: &Model, extra: &[Dependence], guess: &Judged| {
-        judge(
-            data,
-            model,
-            extra,
-            Some(Guess::of(&guess.parts)),
-            effort(data),
-        )
-    };
+fn without_idle(data: &Data, chosen: Judged, chain_s: f64) -> Judged {
     let mut names = chosen.clone();
     if !chosen.extra.is_empty() {
-        match judged(&chosen.model, &[], &chosen) {
+        match again(data, &chosen.model, &[], &chosen) {
             Some(own) => names = own,
             None => return chosen,
         }
     }
-    let mut dropped = false;
+    let all = names.model.terms.len();
     while names.model.terms.len() > 1 {
-        let all: Vec<Option<Judged>> = (0..names.model.terms.len())
-            .map(|at| {
-                let mut model = names.model.clone();
-                model.terms.remove(at);
-                judged(&model, &[], &names)
-            })
-            .collect();
-        // One name fewer is never likelier: where it is, its noise is the better start for all of them.
-        for without in all.iter().flatten() {
-            if without.loss < names.loss
-                && let Some(again) = judged(&names.model, &[], without)
-                && again.loss < names.loss
-            {
-                names = again;
-            }
-        }
-        let idle = all.into_iter().enumerate().filter_map(|(at, without)| {
-            let without = without?;
-            let entry = names.model.terms[at].entry;
-            let claim = Claim::Mechanism(data.catalogue.get(entry).id(), entry);
-            let size = f64::INFINITY;
-            let before = Before::new(data, &without, chain_s, 0.0);
-            let trial = before.tried(claim, names.clone(), size);
-            (!needed(&trial)).then(|| (trial.weight(), without))
-        });
-        // The least of them goes, and the others are asked again.
-        let Some((_, without)) = idle.min_by(|a, b| a.0.total_cmp(&b.0)) else {
+        let without = without_each(data, &mut names);
+        let Some(fewer) = without_least_needed(data, &names, without, chain_s) else {
             break;
         };
-        names = without;
-        dropped = true;
+        names = fewer;
     }
-    if dropped {
-        chosen = judged(&names.model, &chosen.extra, &names).unwrap_or(names);
+    if names.model.terms.len() == all {
+        return chosen;
     }
-    chosen
+    again(data, &names.model, &chosen.extra, &names).unwrap_or(names)
+}
+
+/// The model without each of its names. One name fewer is never likelier: where it is, its noise is the better start
+/// for all of them, and the model is judged anew from there.
+fn without_each(data: &Data, names: &mut Judged) -> Vec<Option<Judged>> {
+    let without: Vec<Option<Judged>> = (0..names.model.terms.len())
+        .map(|at| {
+            let mut model = names.model.clone();
+            model.terms.remove(at);
+            again(data, &model, &[], names)
+        })
+        .collect();
+    for fewer in without.iter().flatten() {
+        if fewer.loss < names.loss
+            && let Some(better) = again(data, &names.model, &[], fewer)
+            && better.loss < names.loss
+        {
+            *names = better;
+        }
+    }
+    without
+}
+
+/// The model without the name that least speaks for among those that the others do not need; nothing where all are
+/// needed.
+fn without_least_needed(
+    data: &Data,
+    names: &Judged,
+    without: Vec<Option<Judged>>,
+    chain_s: f64,
+) -> Option<Judged> {
+    let idle = without.into_iter().enumerate().filter_map(|(at, fewer)| {
+        let fewer = fewer?;
+        let entry = names.model.terms[at].entry;
+        let claim = Claim::Mechanism(data.catalogue.get(entry).id(), entry);
+        let before = Before::new(data, &fewer, chain_s, 0.0);
+        let trial = before.tried(claim, names.clone(), f64::INFINITY);
+        (!needed(&trial)).then(|| (trial.weight(), fewer))
+    });
+    let least = idle.min_by(|a, b| a.0.total_cmp(&b.0));
+    least.map(|(_, fewer)| fewer)
 }

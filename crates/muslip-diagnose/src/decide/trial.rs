@@ -5,7 +5,7 @@ use crate::constants::{
     LEAST_GAIN_OF_DEPENDENCE_AT_SENSORS, LEAST_MEMORY_S, LEAST_PREDICTED,
     LEAST_PREDICTED_BY_DEPENDENCE, LEAST_T, LEAST_T_AT_SENSORS, LEAST_T_OF_DEPENDENCE,
     LEAST_T_OF_DEPENDENCE_AT_SENSORS, LEAST_T_OF_LIKELIER, PRICE_OF_NAME, PRICE_OF_PARAMETER,
-    REAL_MEMORY_PREDICTED, REAL_MEMORY_T, RINGING,
+    REAL_MEMORY_PREDICTED, REAL_MEMORY_T,
 };
 use crate::data::Data;
 use crate::innovations::dependence::Dependence;
@@ -50,9 +50,9 @@ impl Claim {
     }
 
     /// Whether it works through the force that is predicted.
-    fn works_through_force(&self) -> bool {
+    fn works_through_force(&self, data: &Data) -> bool {
         match self {
-            Self::Mechanism(id, _) => through_force(*id),
+            Self::Mechanism(_, entry) => data.catalogue.get(*entry).through_force(),
             Self::Dependence(own) => own.balance == Balance::Tyre,
         }
     }
@@ -191,10 +191,10 @@ impl<'a> Before<'a> {
         let readings = counts.sum::<usize>() / judged.parts.len().max(1);
         let balance = claim.balance(data);
         let named = base.model.terms.iter().any(|t| {
-            let id = data.catalogue.get(t.entry).id();
-            id.balance() == balance && (balance != Balance::Tyre || through_force(id))
+            let term = data.catalogue.get(t.entry);
+            term.id().balance() == balance && (balance != Balance::Tyre || term.through_force())
         });
-        let in_force = claim.works_through_force();
+        let in_force = claim.works_through_force(data);
         let predicts = if in_force {
             self.predicted_better(&judged)
         } else {
@@ -207,7 +207,8 @@ impl<'a> Before<'a> {
         });
         let own = term.is_none_or(|(_, entry, p)| data.catalogue.get(entry).owns(p));
         let memory_s = term.and_then(|(id, entry, p)| {
-            Some((memory_s(data, id, p)?, least_memory_s(data, id, entry)))
+            let memory_s = data.catalogue.get(entry).memory_s(p, &data.context)?;
+            Some((memory_s, least_memory_s(data, id, entry)))
         });
         let real = in_force && predicts > REAL_MEMORY_PREDICTED && at_sensors.1 > REAL_MEMORY_T;
         let chain_s = if real { 0.0 } else { self.chain_s };
@@ -262,16 +263,6 @@ fn squares_by_best_law(data: &Data, judged: &Judged) -> Vec<f64> {
         .collect()
 }
 
-/// Whether a mechanism works through the force that is predicted.
-#[must_use]
-pub fn through_force(id: Id) -> bool {
-    let timing = matches!(
-        id,
-        Id::EffectiveRadius | Id::EncoderRipple | Id::WheelSpeedDelay | Id::VehicleSpeedDelay
-    );
-    id.balance() == Balance::Tyre && !timing
-}
-
 /// Shortest memory in s that is named: a filtered reading of the brake holds less noise than the reading itself, which
 /// looks like a short lag, so there its descriptor's smallest useful effect holds.
 fn least_memory_s(data: &Data, id: Id, entry: usize) -> f64 {
@@ -279,23 +270,6 @@ fn least_memory_s(data: &Data, id: Id, entry: usize) -> f64 {
         (data.catalogue.get(entry).guide().smallest_size)(&data.context)
     } else {
         LEAST_MEMORY_S
-    }
-}
-
-/// Memory of a mechanism in s, where it has one.
-fn memory_s(data: &Data, id: Id, parameters: &[f64]) -> Option<f64> {
-    let first = *parameters.first()?;
-    match id {
-        Id::BrakeLag | Id::ForceLag | Id::ForceDelay => Some(first),
-        Id::RelaxationLength => Some(first / data.context.mean_speed),
-        Id::StructuralResonance => {
-            let omega = core::f64::consts::TAU * first;
-            let damping = parameters.get(1).copied().unwrap_or(1.0);
-            // What rings remembers as long as it rings.
-            let rings = damping < RINGING;
-            Some(1.0 / (omega * if rings { damping } else { 1.0 }))
-        }
-        _ => None,
     }
 }
 

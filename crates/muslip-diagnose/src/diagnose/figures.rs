@@ -2,16 +2,16 @@
 
 use std::collections::BTreeMap;
 
-use super::Answer;
+use super::answer::Answer;
 use super::named::least_delay;
 use crate::constants::VAGUE_DELAY_S;
 use crate::looked::{POWER, looked_for};
 use crate::mechanism::{Balance, Id};
 use crate::number::finite_or_zero;
 use crate::outcome::{ChannelNoise, Estimate, Fit, LookedFor, MinimumDetectable, Trace};
-use crate::prepare::Series;
 use crate::proof::Predicted;
 use crate::repaired::Repaired;
+use crate::series::Series;
 use crate::split::Split;
 
 /// Points of a trace.

@@ -1,14 +1,14 @@
 //! Where the chosen model differs from the base.
 
-use super::Answer;
+use super::answer::Answer;
 use crate::correction::Levers;
 use crate::innovations::rows::rows_of;
 use crate::law::closest;
 use crate::locate::{intervals, regions};
-use crate::mechanism::{Balance, Id};
+use crate::mechanism::{Balance, Describe, Id};
 use crate::model::Model;
 use crate::outcome::{Interval, Region};
-use crate::prepare::Series;
+use crate::series::Series;
 
 /// Time in s over which a speed's change is an acceleration.
 const MEAN_S: f64 = 0.05;
@@ -63,14 +63,16 @@ impl Answer<'_> {
 
     /// Channel that shows it.
     fn channel_of(&self, balance: Balance) -> &'static str {
-        let terms = &self.decision.chosen.model.terms;
-        let ripple =
-            |t: &crate::model::Term| self.data.catalogue.get(t.entry).id() == Id::EncoderRipple;
-        match balance {
-            Balance::Tyre if !terms.is_empty() && terms.iter().all(ripple) => "wheel_speed_rad_s",
-            Balance::Tyre => "drag_force_n",
-            Balance::Wheel => "wheel_speed_rad_s",
-            Balance::Vehicle => "vehicle_speed_m_s",
+        let catalogue = &self.data.catalogue;
+        let terms = self.decision.chosen.model.terms.iter();
+        let mechanisms = terms.map(|t| catalogue.get(t.entry));
+        let mut own = mechanisms.filter(|m| m.id().balance() == balance);
+        let usual = balance.channel();
+        let first = own.next().map_or(usual, Describe::channel);
+        if own.all(|m| m.channel() == first) {
+            first
+        } else {
+            usual
         }
     }
 

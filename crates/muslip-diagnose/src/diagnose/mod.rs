@@ -1,5 +1,6 @@
 //! The diagnosis: the stages of the argument in their order, and its result put together from what each found.
 
+mod answer;
 mod figures;
 mod located;
 mod model_out;
@@ -7,26 +8,20 @@ mod named;
 
 use std::collections::BTreeMap;
 
-use nalgebra::DMatrix;
-
+use self::answer::{Answer, Given};
 use self::figures::{fit_of, traces};
 use self::model_out::Predicts;
-use self::named::DELAYS;
 use crate::audit::{Audit, audit};
 use crate::campaign::{Rig, Run};
-use crate::chain::timing::{Timing, timed};
 use crate::constants::LEAST_OF_TYRE;
 use crate::data::Data;
-use crate::decide::{Decision, decide, through_force};
-use crate::innovations::hypothesis::Judged;
-use crate::innovations::noise::BalanceParts;
 use crate::looked::looked_for;
-use crate::mechanism::{Balance, Id};
-use crate::model::{Model, TYRE_BASE};
+use crate::mechanism::{Balance, Describe, Id};
+use crate::model::Model;
 use crate::number::finite_or_zero;
 use crate::outcome::{Diagnosis, Estimate, Fault, Fit, Recording, Role, Verdict};
-use crate::prepare::Series;
 use crate::repaired::{Predicting, Repaired};
+use crate::series::Series;
 use crate::split::Split;
 
 /// Called with the share of the work done (0..=1) and what is being done.
@@ -76,15 +71,6 @@ pub fn diagnose(rig: &Rig, runs: Vec<Run>, progress: Progress<'_>) -> Diagnosis 
     let diagnosis = answer.assemble(&kept, proof);
     progress(1.0, "done");
     diagnosis
-}
-
-/// What was given, as it was recorded.
-struct Given<'a> {
-    rig: &'a Rig,
-    runs: &'a [Run],
-    /// Samples of the recordings that are one here.
-    averaged: usize,
-    data: Data,
 }
 
 impl Given<'_> {
@@ -184,37 +170,7 @@ impl Given<'_> {
     }
 }
 
-/// What the argument came to, made without what is kept.
-struct Answer<'a> {
-    given: &'a Given<'a>,
-    kept: &'a Split,
-    audit: &'a Audit,
-    data: Data,
-    timing: Timing,
-    decision: Decision,
-}
-
-impl<'a> Answer<'a> {
-    /// The argument; `None` where nothing usable is left.
-    fn of(
-        given: &'a Given<'a>,
-        kept: &'a Split,
-        audit: &'a Audit,
-        timing: Option<&Timing>,
-    ) -> Option<Self> {
-        let (data, timing, base) = timed(given.rig, given.runs, audit, kept, timing)?;
-        // Delays of the speeds are the chain's: they are named by what the timing shows.
-        let decision = decide(&data, base, &DELAYS, timing.off_by());
-        Some(Self {
-            given,
-            kept,
-            audit,
-            data,
-            timing,
-            decision,
-        })
-    }
-
+impl Answer<'_> {
     fn found_nothing(&self) -> bool {
         let chosen = &self.decision.chosen;
         chosen.model.terms.is_empty() && chosen.extra.is_empty() && self.named_delays().is_empty()
@@ -250,7 +206,10 @@ impl<'a> Answer<'a> {
         };
         if says_something && !predicts.known {
             for named in &mut mechanisms {
-                if Id::parse(named.id).is_some_and(through_force) {
+                if Id::parse(named.id)
+                    .and_then(|id| self.data.catalogue.of(id))
+                    .is_some_and(Describe::through_force)
+                {
                     named.evidence.confidence = named.evidence.confidence.min(0.5);
                 }
             }
@@ -290,26 +249,5 @@ impl<'a> Answer<'a> {
             },
             found,
         }
-    }
-
-    /// Covariance in the order of the model's whole vector.
-    fn covariance(&self, judged: &Judged) -> DMatrix<f64> {
-        let n = judged.model.vector().len();
-        let own: Vec<usize> = [0, 1].into_iter().chain(TYRE_BASE..n).collect();
-        let mut all = DMatrix::zeros(n, n);
-        for (i, &a) in own.iter().enumerate() {
-            for (j, &b) in own.iter().enumerate() {
-                all[(a, b)] = finite_or_zero(judged.covariance[(i, j)]);
-            }
-        }
-        all
-    }
-
-    /// White noise of a balance's readings as fitted.
-    fn white(&self, balance: Balance) -> Option<f64> {
-        let mut parts = self.decision.chosen.parts.iter();
-        parts
-            .find(|p| p.balance == balance)
-            .map(BalanceParts::white)
     }
 }

@@ -2,7 +2,7 @@
 
 use nalgebra::DMatrix;
 
-use super::Answer;
+use super::answer::Answer;
 use crate::campaign::Run;
 use crate::chain::correct::Lateness;
 use crate::constants::{LEAST_GAIN_OF_PREDICTION, LEAST_STDS_GAINED, MOST_WORSE};
@@ -10,8 +10,8 @@ use crate::law::closest;
 use crate::mechanism::Stage;
 use crate::model::{Model, TYRE_BASE};
 use crate::number::{finite_or_zero, mean_and_std};
-use crate::prepare::Series;
 use crate::repaired::{Domain, KnownRecording, NoiseModel, Repaired, RepairedTerm, Which};
+use crate::series::Series;
 
 /// Terms of a model with the covariance of all its parameters.
 struct Terms {

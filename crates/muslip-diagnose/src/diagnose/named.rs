@@ -2,19 +2,16 @@
 
 use std::collections::BTreeMap;
 
-use super::Answer;
+use super::answer::Answer;
 use crate::audit::Timing;
 use crate::constants::{AUDITED, LEAST_DELAY_S, PREDICTED_APART, SURE_DELAY, VAGUE_DELAY_S};
 use crate::decide::{Claim, Trial, softness, stands};
 use crate::figures::figures;
 use crate::innovations::dependence::Dependence;
-use crate::mechanism::{Id, Reported};
+use crate::mechanism::{Id, Reported, Speed};
 use crate::number::finite_or_zero;
 use crate::outcome::{Alternative, Evidence, Figure, NamedMechanism, Unexplained, sentence};
 use crate::separating::separating_test;
-
-/// Delays that the timing names: no round weighs them.
-pub(super) const DELAYS: [Id; 2] = [Id::WheelSpeedDelay, Id::VehicleSpeedDelay];
 
 /// Smallest delay in s that is named where the timing is as sure as this.
 pub(super) fn least_delay(late: &Timing) -> f64 {
@@ -116,9 +113,9 @@ impl Answer<'_> {
 
     /// Delays of the speeds that the base simulation's residuals show.
     pub(super) fn named_delays(&self) -> Vec<NamedMechanism> {
-        DELAYS
-            .iter()
-            .filter_map(|&id| {
+        let delays = self.data.catalogue.delays().into_iter();
+        delays
+            .filter_map(|id| {
                 let [late, audited] = self.delays_of(id)?;
                 let sure = late.std < VAGUE_DELAY_S && late.value > least_delay(&late);
                 // Fitted with a law that may be wrong it is believed where the audit, which has none, says so too.
@@ -135,18 +132,16 @@ impl Answer<'_> {
 
     /// The same, and what the audit says of it.
     fn delays_of(&self, id: Id) -> Option<[Timing; 2]> {
-        let (fitted, audited) = match id {
-            Id::WheelSpeedDelay => (self.timing.wheel, self.audit.wheel_late),
-            Id::VehicleSpeedDelay => (self.timing.vehicle, self.audit.vehicle_late),
-            _ => return None,
+        let (fitted, audited) = match self.data.catalogue.of(id)?.late()? {
+            Speed::Wheel => (self.timing.wheel, self.audit.wheel_late),
+            Speed::Vehicle => (self.timing.vehicle, self.audit.vehicle_late),
         };
         Some([self.timing.against_drag(fitted), audited])
     }
 
     /// A delay as a mechanism, in that mechanism's own words.
     fn delay(&self, id: Id, value: f64, std: f64) -> Option<NamedMechanism> {
-        let mut entries = self.data.catalogue.entries().iter();
-        let mechanism = entries.find(|m| m.id() == id)?;
+        let mechanism = self.data.catalogue.of(id)?;
         let reported = Reported {
             name: "delay",
             unit: "s",

@@ -7,8 +7,8 @@
 
 use core::ops::Range;
 
-use crate::data::Data;
-use crate::mechanism::Balance;
+use crate::balance::Balance;
+use crate::series::Series;
 use crate::smooth::median_in_place;
 
 /// Shortest block in s: a fifth of the period of the fastest force that is named.
@@ -120,9 +120,9 @@ pub fn own_interval(time: &[f64], x: &[f64], segments: &[Range<usize>]) -> f64 {
 
 /// Blocks of every run, in the order tyre, wheel, vehicle.
 #[must_use]
-pub fn blocks(data: &Data) -> Vec<[Blocks; 3]> {
-    let interval = |f: &dyn Fn(&crate::prepare::Series) -> f64| {
-        let mut all: Vec<f64> = data.series.iter().map(f).collect();
+pub fn blocks(series: &[Series]) -> Vec<[Blocks; 3]> {
+    let interval = |f: &dyn Fn(&Series) -> f64| {
+        let mut all: Vec<f64> = series.iter().map(f).collect();
         if all.is_empty() {
             0.0
         } else {
@@ -132,7 +132,7 @@ pub fn blocks(data: &Data) -> Vec<[Blocks; 3]> {
     let wheel = interval(&|s| own_interval(&s.time, &s.wheel.raw, &s.wheel_balance));
     let vehicle = interval(&|s| own_interval(&s.time, &s.speed.raw, &s.vehicle_balance));
     let length = |own: f64| (OWN_READINGS * own).clamp(SHORTEST_S, LONGEST_S);
-    data.series
+    series
         .iter()
         .map(|s| {
             [

@@ -5,16 +5,13 @@ use rayon::prelude::*;
 use super::dependence::{Dependence, width};
 use super::gram::Columns;
 use super::noise::Slopes;
-use super::rows::{Rows, quiet_force, rows, rows_of};
+use super::rows::{Rows, Triple, quiet_force, rows, rows_of};
 use crate::correction::Levers;
 use crate::data::{Data, WIDTH};
 use crate::mechanism::{Balance, Evidence, Id};
 use crate::model::{Model, Term};
 use crate::number::{Dual, Number, finite_or_zero};
 use crate::prepare::mean_twice_about;
-
-/// Rows of one run by balance, in the order tyre, wheel, vehicle.
-pub type Triple = [Vec<f64>; 3];
 
 /// A mechanism at one place of its nonlinear parameters, or a free dependence.
 #[derive(Clone, Debug)]

@@ -1,7 +1,7 @@
 //! A free dependence on one variable: what is said where no mechanism of the vocabulary accounts for a mismatch, and
 //! what every mechanism has to compete with.
 
-use super::candidates::Triple;
+use super::rows::Triple;
 use crate::correction::{Action, Levers, hat, knots_among};
 use crate::data::Data;
 use crate::mechanism::Balance;

@@ -134,7 +134,7 @@ fn integral(dt: &[f64], x: &[f64]) -> Vec<f64> {
 #[must_use]
 pub fn parts(data: &Data, slopes: &Slopes) -> Vec<BalanceParts> {
     let s = &data.series;
-    let sigma = |f: &dyn Fn(&crate::prepare::Series) -> f64| median(s.iter().map(f));
+    let sigma = |f: &dyn Fn(&crate::series::Series) -> f64| median(s.iter().map(f));
     let dt = data.context.dt;
     let drag = sigma(&|s| s.drag_sigma).max(1e-6 * data.context.max_drag);
     let wheel = sigma(&|s| s.wheel.sigma).max(1e-6 * data.context.mean_wheel_speed);

@@ -8,7 +8,10 @@
 use crate::data::{Catalogue, Data, Listed};
 use crate::mechanism::{Balance, Context, Stage, State};
 use crate::model::{Model, tyre};
-use crate::prepare::Series;
+use crate::series::Series;
+
+/// Rows of one run by balance, in the order tyre, wheel, vehicle.
+pub type Triple = [Vec<f64>; 3];
 
 /// Residuals of the three balances on one run, one value a sample; empty where the balance cannot be formed.
 pub struct Rows<T> {
@@ -78,8 +81,7 @@ pub fn rows<T: Listed>(
             let own = &p[at..at + term.parameters.len()];
             at += term.parameters.len();
             let mechanism = T::entry(catalogue, term.entry);
-            let both = mechanism.id() == crate::mechanism::Id::ForceGain;
-            if mechanism.stage() == stage || (both && stage == Stage::Wheel) {
+            if mechanism.acts_at(stage) {
                 mechanism.apply(own, series, context, &mut state);
             }
         }

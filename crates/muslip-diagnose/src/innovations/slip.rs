@@ -11,7 +11,8 @@ use super::hypothesis::Judged;
 use super::noise::{BalanceParts, Slopes};
 use crate::data::Data;
 use crate::mechanism::Balance;
-use crate::prepare::{Series, mean_twice_about};
+use crate::prepare::mean_twice_about;
+use crate::series::Series;
 
 /// Reach in s of the means of what the drag says of the slip.
 const REACH_S: f64 = 0.008;

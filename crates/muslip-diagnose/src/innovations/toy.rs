@@ -80,6 +80,6 @@ pub(super) fn stop(noise: Noise, seed: u64) -> Data {
     }
     run.brake_torque_nm = Some(torques);
     let mut data = Data::new(&rig, core::slice::from_ref(&run));
-    data.blocks = blocks(&data);
+    data.blocks = blocks(&data.series);
     data
 }

@@ -2,11 +2,11 @@
 
 use super::guide::runs;
 use super::{
-    Alias, Balance, Compensation, Context, Describe, Evidence, Example, Guide, Id, Kind, Law,
-    Mechanism, Memory, Parameter, Reported, Sign, Stage, State,
+    Against, Alias, Balance, Compensation, Context, Describe, Evidence, Example, Guide, Id, Kind,
+    Law, Mechanism, Memory, Parameter, Reported, Sign, Stage, State,
 };
 use crate::number::Number;
-use crate::prepare::Series;
+use crate::series::Series;
 
 /// A deceleration that grows with speed squared and is not tyre drag.
 pub struct AeroDrag;
@@ -17,6 +17,9 @@ impl Describe for AeroDrag {
     }
     fn stage(&self) -> Stage {
         Stage::Vehicle
+    }
+    fn drawn_over(&self) -> Against {
+        Against::VehicleSpeed
     }
     fn parameters(&self, context: &Context) -> Vec<Parameter> {
         // Up to one g at the campaign's largest speed.

@@ -2,11 +2,11 @@
 
 use super::guide::runs;
 use super::{
-    Alias, Balance, Compensation, Context, Describe, Evidence, Example, Guide, Id, Kind, Law,
-    Mechanism, Memory, Parameter, Reported, Sign, Stage, State,
+    Against, Alias, Balance, Compensation, Context, Describe, Evidence, Example, Guide, Id, Kind,
+    Law, Mechanism, Memory, Parameter, Reported, Sign, Stage, State,
 };
 use crate::number::Number;
-use crate::prepare::Series;
+use crate::series::Series;
 
 /// What the torque depends on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -41,6 +41,13 @@ impl Describe for BearingDrag {
     }
     fn stage(&self) -> Stage {
         Stage::Wheel
+    }
+    fn drawn_over(&self) -> Against {
+        if self.form() == "with_load" {
+            Against::NormalForce
+        } else {
+            Against::WheelSpeed
+        }
     }
     fn parameters(&self, context: &Context) -> Vec<Parameter> {
         let scale = (context.mean_load * context.radius).max(1e-9);

@@ -6,7 +6,7 @@ use super::{
     Mechanism, Memory, Parameter, Reported, Sign, Stage, State,
 };
 use crate::number::Number;
-use crate::prepare::Series;
+use crate::series::Series;
 
 /// Brake temperature in units of the mean brake power times a second, from cold at the start of a run.
 fn heat<T: Number>(time_constant: T, series: &Series, context: &Context) -> Vec<T> {

@@ -7,7 +7,7 @@ use super::{
     Mechanism, Memory, Parameter, Reported, Sign, Stage, State,
 };
 use crate::number::Number;
-use crate::prepare::Series;
+use crate::series::Series;
 
 /// Brake torque follows pressure with a lag.
 pub struct BrakeLag;
@@ -18,6 +18,9 @@ impl Describe for BrakeLag {
     }
     fn stage(&self) -> Stage {
         Stage::Wheel
+    }
+    fn memory_s(&self, p: &[f64], _context: &Context) -> Option<f64> {
+        p.first().copied()
     }
     fn parameters(&self, context: &Context) -> Vec<Parameter> {
         vec![Parameter::new(

@@ -5,7 +5,7 @@ use super::{
     Memory, Parameter, Reported, Sign, Stage, State,
 };
 use crate::number::Number;
-use crate::prepare::Series;
+use crate::series::Series;
 
 /// What the radius depends on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -40,6 +40,9 @@ impl Describe for EffectiveRadius {
     }
     fn stage(&self) -> Stage {
         Stage::Kinematics
+    }
+    fn through_force(&self) -> bool {
+        false
     }
     fn parameters(&self, _context: &Context) -> Vec<Parameter> {
         let mut all = vec![Parameter::new("radius_error", "1", -0.1, 0.1)];

@@ -6,7 +6,7 @@ use super::{
     Memory, Parameter, Reported, Sign, Stage, State,
 };
 use crate::number::Number;
-use crate::prepare::Series;
+use crate::series::Series;
 
 /// Largest amplitude of an order, as a share of the wheel speed.
 const LIMIT: f64 = 0.08;
@@ -26,6 +26,12 @@ impl Describe for EncoderRipple {
     }
     fn stage(&self) -> Stage {
         Stage::Kinematics
+    }
+    fn through_force(&self) -> bool {
+        false
+    }
+    fn channel(&self) -> &'static str {
+        "wheel_speed_rad_s"
     }
     fn parameters(&self, context: &Context) -> Vec<Parameter> {
         self.form.parameters(context, LIMIT)

@@ -6,7 +6,7 @@ use super::{
     Mechanism, Memory, Parameter, Reported, Sign, Stage, State,
 };
 use crate::number::Number;
-use crate::prepare::Series;
+use crate::series::Series;
 
 /// The drag channel reports late by a fixed time.
 pub struct ForceDelay;
@@ -16,7 +16,10 @@ impl Describe for ForceDelay {
         Id::ForceDelay
     }
     fn stage(&self) -> Stage {
-        Stage::Chain
+        Stage::Line
+    }
+    fn memory_s(&self, p: &[f64], _context: &Context) -> Option<f64> {
+        p.first().copied()
     }
     fn parameters(&self, context: &Context) -> Vec<Parameter> {
         vec![Parameter::new(

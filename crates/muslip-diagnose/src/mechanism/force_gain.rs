@@ -2,11 +2,11 @@
 
 use super::guide::runs;
 use super::{
-    Alias, Balance, Compensation, Context, Describe, Evidence, Example, Guide, Id, Kind, Law,
-    Mechanism, Memory, Parameter, Reported, Sign, Stage, State,
+    Against, Alias, Balance, Compensation, Context, Describe, Evidence, Example, Guide, Id, Kind,
+    Law, Mechanism, Memory, Parameter, Reported, Sign, Stage, State,
 };
 use crate::number::Number;
-use crate::prepare::Series;
+use crate::series::Series;
 
 /// The drag channel's scale is wrong.
 pub struct ForceGain;
@@ -17,6 +17,12 @@ impl Describe for ForceGain {
     }
     fn stage(&self) -> Stage {
         Stage::Vehicle
+    }
+    fn acts_also_at(&self) -> Option<Stage> {
+        Some(Stage::Wheel)
+    }
+    fn drawn_over(&self) -> Against {
+        Against::Drag
     }
     fn parameters(&self, _context: &Context) -> Vec<Parameter> {
         vec![Parameter::new("gain_error", "1", -0.6, 1.5)]

@@ -7,7 +7,7 @@ use super::{
     Mechanism, Memory, Parameter, Reported, Sign, Stage, State,
 };
 use crate::number::Number;
-use crate::prepare::Series;
+use crate::series::Series;
 
 /// The drag channel passes a first-order low-pass filter.
 pub struct ForceLag;
@@ -17,7 +17,10 @@ impl Describe for ForceLag {
         Id::ForceLag
     }
     fn stage(&self) -> Stage {
-        Stage::Chain
+        Stage::Filter
+    }
+    fn memory_s(&self, p: &[f64], _context: &Context) -> Option<f64> {
+        p.first().copied()
     }
     fn parameters(&self, context: &Context) -> Vec<Parameter> {
         vec![Parameter::new(

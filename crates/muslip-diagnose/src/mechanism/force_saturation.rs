@@ -5,7 +5,7 @@ use super::{
     Memory, Parameter, Reported, Sign, Stage, State,
 };
 use crate::number::Number;
-use crate::prepare::Series;
+use crate::series::Series;
 
 /// How the drag channel comes to its limit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -40,7 +40,7 @@ impl Describe for ForceSaturation {
         }
     }
     fn stage(&self) -> Stage {
-        Stage::Chain
+        Stage::Input
     }
     fn parameters(&self, context: &Context) -> Vec<Parameter> {
         let limit = Parameter::new(

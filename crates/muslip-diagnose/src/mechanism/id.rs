@@ -1,27 +1,6 @@
 //! Names of the vocabulary.
 
-/// A balance of the base simulation.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub enum Balance {
-    /// drag = normal · mu(slip)
-    Tyre,
-    /// J dω/dt = R·drag − brake torque
-    Wheel,
-    /// m dv/dt = −drag
-    Vehicle,
-}
-
-impl Balance {
-    /// The contract's word.
-    #[must_use]
-    pub fn as_str(self) -> &'static str {
-        match self {
-            Self::Tyre => "tyre",
-            Self::Wheel => "wheel",
-            Self::Vehicle => "vehicle",
-        }
-    }
-}
+use crate::balance::Balance;
 
 macro_rules! ids {
     ($($variant:ident $word:literal $balance:ident $what:literal;)*) => {

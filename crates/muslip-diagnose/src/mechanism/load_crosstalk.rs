@@ -6,7 +6,7 @@ use super::{
     Mechanism, Memory, Parameter, Reported, Sign, Stage, State,
 };
 use crate::number::Number;
-use crate::prepare::Series;
+use crate::series::Series;
 
 /// The drag channel reads a share of the normal force, also at standstill.
 pub struct LoadCrosstalk;

@@ -5,7 +5,7 @@ use super::{
     Memory, Parameter, Reported, Sign, Stage, State,
 };
 use crate::number::Number;
-use crate::prepare::Series;
+use crate::series::Series;
 
 /// Peak friction changes with normal force.
 pub struct LoadSensitivity {

@@ -42,12 +42,12 @@ mod wheel_speed_delay;
 mod zero_drift;
 
 pub use guide::{Alias, Compensation, Example, Guide, Kind, Memory, Sign};
-pub use id::{Balance, Id};
+pub use id::Id;
 
-use serde::{Deserialize, Serialize};
-
+pub use crate::balance::Balance;
+pub use crate::context::{Before, Context};
 use crate::number::Number;
-use crate::prepare::Series;
+use crate::series::Series;
 
 /// Where in the chain from speeds to reading a mechanism acts; stages run in this order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -64,12 +64,46 @@ pub enum Stage {
     Contact,
     /// What the load cell adds to that force.
     Reading,
-    /// What the measuring chain does to the reading.
-    Chain,
+    /// What the load cell's structure does to the reading.
+    Structure,
+    /// What its filter does.
+    Filter,
+    /// How late its line is.
+    Line,
+    /// Where its input clips.
+    Input,
     /// Forces on the vehicle.
     Vehicle,
     /// Torques on the wheel.
     Wheel,
+}
+
+/// A speed that may be late.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Speed {
+    /// Wheel speed.
+    Wheel,
+    /// Vehicle speed.
+    Vehicle,
+}
+
+/// What the picture of an effect on wheel or vehicle is drawn over.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Against {
+    /// Time in s: the effect has a memory.
+    Time,
+    /// Vehicle speed in m/s.
+    VehicleSpeed,
+    /// Wheel speed in rad/s.
+    WheelSpeed,
+    /// Normal force in N.
+    NormalForce,
+    /// Drag reading in N.
+    Drag,
+    /// Vehicle acceleration in m/s².
+    VehicleAcceleration,
+    /// Wheel acceleration in rad/s².
+    WheelAcceleration,
 }
 
 /// A parameter of a mechanism: bounds of what is physically plausible.
@@ -107,81 +141,6 @@ pub struct Reported<T> {
     pub unit: &'static str,
     /// Value.
     pub value: T,
-}
-
-/// What is common to all runs: typical sizes that give the parameters their scale.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Context {
-    /// Rig radius in m.
-    pub radius: f64,
-    /// Wheel inertia in kg m².
-    pub inertia: f64,
-    /// Translating mass in kg.
-    pub mass: f64,
-    /// Rig file's peak friction and slip at the peak: a fixed curve for scales that must not move.
-    pub nominal: [f64; 2],
-    /// Mean normal force while rolling in N.
-    pub mean_load: f64,
-    /// Mean vehicle speed while rolling in m/s.
-    pub mean_speed: f64,
-    /// Largest vehicle speed in m/s.
-    pub max_speed: f64,
-    /// Mean wheel speed while rolling in rad/s.
-    pub mean_wheel_speed: f64,
-    /// Mean friction power on the nominal curve in W.
-    pub mean_power: f64,
-    /// Friction work over the whole campaign on the nominal curve in J.
-    pub total_work: f64,
-    /// Mean brake power in W.
-    pub mean_brake_power: f64,
-    /// Typical sampling step in s.
-    pub dt: f64,
-    /// Longest run in s.
-    pub duration: f64,
-    /// Sum of the runs' durations in s.
-    pub total_time: f64,
-    /// Number of runs in the campaign.
-    pub runs: usize,
-    /// Largest distance run in m.
-    pub distance: f64,
-    /// Whether each recording's clock goes on from the one before.
-    pub clock_continues: bool,
-    /// First time stamp of the campaign in s.
-    pub first_time: f64,
-    /// Noise of the drag channel in N.
-    pub drag_sigma: f64,
-    /// Largest drag reading (99.9th percentile) in N.
-    pub max_drag: f64,
-    /// Factor by which the smoothing windows are widened, for slip is noisy here.
-    pub reach_factor: f64,
-    /// Work before each run in J and clock offset of each run in s, by position.
-    pub before: Vec<Before>,
-}
-
-/// What had happened before a run began.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Before {
-    /// Friction work on the nominal curve in J.
-    pub work: f64,
-    /// Time in s.
-    pub time: f64,
-}
-
-impl Context {
-    /// What had happened before the run at this position; after the last one for a new run.
-    #[must_use]
-    pub fn before(&self, index: usize) -> Before {
-        self.before.get(index).copied().unwrap_or(Before {
-            work: self.total_work,
-            time: self.total_time,
-        })
-    }
-    /// Friction of the nominal curve (the rig file's two parameters).
-    #[must_use]
-    pub fn nominal_friction(&self, slip: f64) -> f64 {
-        let x = slip / self.nominal[1];
-        2.0 * self.nominal[0] * x / (1.0 + x * x)
-    }
 }
 
 /// What the base model leaves over on one run: a search can look at it to find where to start.
@@ -348,6 +307,34 @@ pub trait Describe: Send + Sync {
     }
     /// Where it acts.
     fn stage(&self) -> Stage;
+    /// A second stage that it acts at: a scale of the drag is wrong on vehicle and wheel alike.
+    fn acts_also_at(&self) -> Option<Stage> {
+        None
+    }
+    /// Whether it acts at this stage.
+    fn acts_at(&self, stage: Stage) -> bool {
+        self.stage() == stage || self.acts_also_at() == Some(stage)
+    }
+    /// Whether it works through the force that is predicted, and not on the speeds or on another balance.
+    fn through_force(&self) -> bool {
+        self.id().balance() == Balance::Tyre
+    }
+    /// Channel of a recording that shows it.
+    fn channel(&self) -> &'static str {
+        self.id().balance().channel()
+    }
+    /// The speed whose lateness it is: found by the timing of the channels, not among the other mechanisms.
+    fn late(&self) -> Option<Speed> {
+        None
+    }
+    /// How long it remembers with these parameters, in s, where it has a memory: one that the measuring chain has, too.
+    fn memory_s(&self, _parameters: &[f64], _context: &Context) -> Option<f64> {
+        None
+    }
+    /// What the picture of its effect is drawn over, where wheel or vehicle lack it.
+    fn drawn_over(&self) -> Against {
+        Against::Time
+    }
     /// Its parameters for this campaign.
     fn parameters(&self, context: &Context) -> Vec<Parameter>;
     /// Where a search for its parameters may start.

@@ -2,7 +2,7 @@
 
 use super::{Context, Parameter, Reported};
 use crate::number::Number;
-use crate::prepare::Series;
+use crate::series::Series;
 
 /// Largest advance of the highest order's phase from one sample to the next, in rad.
 const MOST_ADVANCE: f64 = 2.0;

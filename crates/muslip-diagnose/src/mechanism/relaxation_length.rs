@@ -6,7 +6,7 @@ use super::{
     Memory, Parameter, Reported, Sign, Stage, State,
 };
 use crate::number::Number;
-use crate::prepare::Series;
+use crate::series::Series;
 
 /// What is delayed by rolling.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -41,6 +41,9 @@ impl Describe for RelaxationLength {
             Form::Slip => Stage::Slip,
             Form::Force => Stage::Contact,
         }
+    }
+    fn memory_s(&self, p: &[f64], context: &Context) -> Option<f64> {
+        Some(p.first()? / context.mean_speed)
     }
     fn parameters(&self, context: &Context) -> Vec<Parameter> {
         vec![Parameter::new(

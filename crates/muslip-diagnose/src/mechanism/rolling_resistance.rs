@@ -6,7 +6,7 @@ use super::{
     Mechanism, Memory, Parameter, Reported, Sign, Stage, State,
 };
 use crate::number::Number;
-use crate::prepare::Series;
+use crate::series::Series;
 
 /// Drag on a rolling, unbraked wheel, proportional to load, absent at standstill.
 pub struct RollingResistance {

@@ -6,7 +6,7 @@ use super::{
     Mechanism, Memory, Parameter, Reported, Sign, Stage, State,
 };
 use crate::number::Number;
-use crate::prepare::Series;
+use crate::series::Series;
 
 /// Largest amplitude of an order, as a share of the drag.
 const LIMIT: f64 = 0.5;

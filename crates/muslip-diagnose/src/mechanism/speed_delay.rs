@@ -8,7 +8,7 @@ use core::ops::Range;
 use super::{Context, Parameter, Reported};
 use crate::cleaning::stretches;
 use crate::number::Number;
-use crate::prepare::{Channel, GAP_STEPS, Series};
+use crate::series::{Channel, GAP_STEPS, Series};
 
 /// Largest delay either way, in s.
 const MOST_S: f64 = 0.15;

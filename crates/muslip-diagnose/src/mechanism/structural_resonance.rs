@@ -6,8 +6,9 @@ use super::{
     Alias, Balance, Compensation, Context, Describe, Evidence, Example, Guide, Id, Kind, Law,
     Mechanism, Memory, Parameter, Reported, Sign, Stage, State,
 };
+use crate::constants::RINGING;
 use crate::number::Number;
-use crate::prepare::Series;
+use crate::series::Series;
 
 /// How much of the force passes through what rings.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -38,7 +39,14 @@ impl Describe for StructuralResonance {
         }
     }
     fn stage(&self) -> Stage {
-        Stage::Chain
+        Stage::Structure
+    }
+    fn memory_s(&self, p: &[f64], _context: &Context) -> Option<f64> {
+        let omega = core::f64::consts::TAU * p.first()?;
+        let damping = p.get(1).copied().unwrap_or(1.0);
+        // What rings remembers as long as it rings.
+        let rings = damping < RINGING;
+        Some(1.0 / (omega * if rings { damping } else { 1.0 }))
     }
     fn parameters(&self, context: &Context) -> Vec<Parameter> {
         let mut all = vec![

@@ -6,7 +6,7 @@ use super::{
     Mechanism, Memory, Parameter, Reported, Sign, Stage, State,
 };
 use crate::number::Number;
-use crate::prepare::Series;
+use crate::series::Series;
 
 /// Longest stretches that are searched for, as shares of the track.
 const LONGEST: [f64; 3] = [1.0, 0.35, 0.12];

@@ -6,7 +6,7 @@ use super::{
     Mechanism, Memory, Parameter, Reported, Sign, Stage, State,
 };
 use crate::number::Number;
-use crate::prepare::Series;
+use crate::series::Series;
 
 /// Forms of the dependence on temperature.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

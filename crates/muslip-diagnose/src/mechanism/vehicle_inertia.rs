@@ -1,11 +1,11 @@
 //! The translating mass is not the rig file's.
 
 use super::{
-    Balance, Compensation, Context, Describe, Evidence, Example, Guide, Id, Kind, Law, Mechanism,
-    Memory, Parameter, Reported, Sign, Stage, State,
+    Against, Balance, Compensation, Context, Describe, Evidence, Example, Guide, Id, Kind, Law,
+    Mechanism, Memory, Parameter, Reported, Sign, Stage, State,
 };
 use crate::number::Number;
-use crate::prepare::Series;
+use crate::series::Series;
 
 /// The translating mass is not the rig file's.
 pub struct VehicleInertia;
@@ -16,6 +16,9 @@ impl Describe for VehicleInertia {
     }
     fn stage(&self) -> Stage {
         Stage::Vehicle
+    }
+    fn drawn_over(&self) -> Against {
+        Against::VehicleAcceleration
     }
     fn parameters(&self, _context: &Context) -> Vec<Parameter> {
         vec![Parameter::new("mass_error", "1", -0.7, 2.0)]

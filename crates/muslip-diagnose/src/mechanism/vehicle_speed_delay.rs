@@ -4,10 +4,10 @@ use super::guide::runs;
 use super::speed_delay::{parameters, report, shift, starts, statement};
 use super::{
     Alias, Balance, Compensation, Context, Describe, Evidence, Example, Guide, Id, Kind, Law,
-    Mechanism, Memory, Parameter, Reported, Sign, Stage, State,
+    Mechanism, Memory, Parameter, Reported, Sign, Speed, Stage, State,
 };
 use crate::number::Number;
-use crate::prepare::Series;
+use crate::series::Series;
 
 /// Slowest speed that a shifted reading may come to while the wheel rolls, in m/s: slip divides by it.
 const SLOWEST_M_S: f64 = 0.5;
@@ -21,6 +21,12 @@ impl Describe for VehicleSpeedDelay {
     }
     fn stage(&self) -> Stage {
         Stage::Kinematics
+    }
+    fn through_force(&self) -> bool {
+        false
+    }
+    fn late(&self) -> Option<Speed> {
+        Some(Speed::Vehicle)
     }
     fn parameters(&self, context: &Context) -> Vec<Parameter> {
         parameters(context)

@@ -1,11 +1,11 @@
 //! The wheel's inertia is not the rig file's.
 
 use super::{
-    Balance, Compensation, Context, Describe, Evidence, Example, Guide, Id, Kind, Law, Mechanism,
-    Memory, Parameter, Reported, Sign, Stage, State,
+    Against, Balance, Compensation, Context, Describe, Evidence, Example, Guide, Id, Kind, Law,
+    Mechanism, Memory, Parameter, Reported, Sign, Stage, State,
 };
 use crate::number::Number;
-use crate::prepare::Series;
+use crate::series::Series;
 
 /// The wheel's inertia is not the rig file's.
 pub struct WheelInertia;
@@ -16,6 +16,9 @@ impl Describe for WheelInertia {
     }
     fn stage(&self) -> Stage {
         Stage::Wheel
+    }
+    fn drawn_over(&self) -> Against {
+        Against::WheelAcceleration
     }
     fn parameters(&self, _context: &Context) -> Vec<Parameter> {
         vec![Parameter::new("inertia_error", "1", -0.8, 3.0)]

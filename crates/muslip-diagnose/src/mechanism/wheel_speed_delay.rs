@@ -4,10 +4,10 @@ use super::guide::runs;
 use super::speed_delay::{parameters, report, shift, starts, statement};
 use super::{
     Alias, Balance, Compensation, Context, Describe, Evidence, Example, Guide, Id, Kind, Law,
-    Mechanism, Memory, Parameter, Reported, Sign, Stage, State,
+    Mechanism, Memory, Parameter, Reported, Sign, Speed, Stage, State,
 };
 use crate::number::Number;
-use crate::prepare::Series;
+use crate::series::Series;
 
 /// The wheel-speed channel reports late, relative to the other channels, by a fixed time.
 pub struct WheelSpeedDelay;
@@ -18,6 +18,12 @@ impl Describe for WheelSpeedDelay {
     }
     fn stage(&self) -> Stage {
         Stage::Kinematics
+    }
+    fn through_force(&self) -> bool {
+        false
+    }
+    fn late(&self) -> Option<Speed> {
+        Some(Speed::Wheel)
     }
     fn parameters(&self, context: &Context) -> Vec<Parameter> {
         parameters(context)

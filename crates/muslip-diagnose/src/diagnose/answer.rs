@@ -1,0 +1,77 @@
+//! What the argument came to: the recordings as given, and what was decided about them.
+
+use nalgebra::DMatrix;
+
+use crate::audit::Audit;
+use crate::campaign::{Rig, Run};
+use crate::chain::timing::{Timing, timed};
+use crate::data::Data;
+use crate::decide::{Decision, decide};
+use crate::innovations::hypothesis::Judged;
+use crate::innovations::noise::BalanceParts;
+use crate::mechanism::Balance;
+use crate::model::TYRE_BASE;
+use crate::number::finite_or_zero;
+use crate::split::Split;
+
+/// What was given, as it was recorded.
+pub(super) struct Given<'a> {
+    pub(super) rig: &'a Rig,
+    pub(super) runs: &'a [Run],
+    /// Samples of the recordings that are one here.
+    pub(super) averaged: usize,
+    pub(super) data: Data,
+}
+
+/// What the argument came to, made without what is kept.
+pub(super) struct Answer<'a> {
+    pub(super) given: &'a Given<'a>,
+    pub(super) kept: &'a Split,
+    pub(super) audit: &'a Audit,
+    pub(super) data: Data,
+    pub(super) timing: Timing,
+    pub(super) decision: Decision,
+}
+
+impl<'a> Answer<'a> {
+    /// The argument; `None` where nothing usable is left.
+    pub(super) fn of(
+        given: &'a Given<'a>,
+        kept: &'a Split,
+        audit: &'a Audit,
+        timing: Option<&Timing>,
+    ) -> Option<Self> {
+        let (data, timing, base) = timed(given.rig, given.runs, audit, kept, timing)?;
+        // Delays of the speeds are the chain's: they are named by what the timing shows.
+        let decision = decide(&data, base, &data.catalogue.delays(), timing.off_by());
+        Some(Self {
+            given,
+            kept,
+            audit,
+            data,
+            timing,
+            decision,
+        })
+    }
+
+    /// Covariance in the order of the model's whole vector.
+    pub(super) fn covariance(&self, judged: &Judged) -> DMatrix<f64> {
+        let n = judged.model.vector().len();
+        let own: Vec<usize> = [0, 1].into_iter().chain(TYRE_BASE..n).collect();
+        let mut all = DMatrix::zeros(n, n);
+        for (i, &a) in own.iter().enumerate() {
+            for (j, &b) in own.iter().enumerate() {
+                all[(a, b)] = finite_or_zero(judged.covariance[(i, j)]);
+            }
+        }
+        all
+    }
+
+    /// White noise of a balance's readings as fitted.
+    pub(super) fn white(&self, balance: Balance) -> Option<f64> {
+        let mut parts = self.decision.chosen.parts.iter();
+        parts
+            .find(|p| p.balance == balance)
+            .map(BalanceParts::white)
+    }
+}
