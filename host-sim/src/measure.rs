@@ -2,10 +2,10 @@
 //! why, and how noisy a measurement is.
 
 use muslip::sample::{RigSample, SampleError, SampleLimits, SlipFriction, slip_friction};
+use muslip_recordings::input_error::InputError;
+use muslip_recordings::recording::{Channel, Recording, Required, Row};
+use muslip_recordings::rig_file::RigFile;
 
-use crate::input_error::InputError;
-use crate::recording::{Channel, Recording, Required, Row};
-use crate::rig_file::RigFile;
 use crate::thin::Thinned;
 
 /// Rows between two calls of a progress report.

@@ -5,6 +5,8 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, PoisonError};
 
 use clap::Args;
+use muslip_recordings::output::{StagedFolder, write_file};
+use muslip_recordings::recording::Recording;
 use rayon::prelude::*;
 use serde_json::json;
 
@@ -13,8 +15,6 @@ use super::estimate::{Choices, Job};
 use super::progress::Progress;
 use super::terminal::Terminal;
 use crate::campaign::{Campaign, Run, index, page_names};
-use crate::output::{StagedFolder, write_file};
-use crate::recording::Recording;
 use crate::report::{FigureFormat, write_figures};
 
 /// Estimate many recordings of one rig and compare them: a page side by side, a page each.

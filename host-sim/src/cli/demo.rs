@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use muslip::filter::mu_slip::Range;
 use muslip_diagnose::outcome::Diagnosis;
+use muslip_recordings::output::{create_folder, write_file};
 
 use super::Failure;
 use super::diagnose::diagnosed;
@@ -14,7 +15,6 @@ use crate::demo;
 use crate::diagnose::job;
 use crate::diagnose::summary::{WIDEST_LINE, summary};
 use crate::estimate::{EstimateOptions, EstimatorKind};
-use crate::output::{create_folder, write_file};
 use crate::wording::estimate_sentence;
 
 /// Show both main jobs on bundled recordings: estimate a curve, find a concealed effect; write reports with plots.

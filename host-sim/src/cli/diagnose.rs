@@ -5,14 +5,15 @@ use std::sync::{Mutex, PoisonError};
 
 use clap::Args;
 use muslip_diagnose::outcome::Diagnosis;
+use muslip_recordings::load;
 
 use super::Failure;
 use super::progress::Progress;
 use super::terminal::Terminal;
 use crate::diagnose::job::{self, WriteError};
+use crate::diagnose::page;
 use crate::diagnose::summary::{WIDEST_LINE, summary};
 use crate::diagnose::views::Views;
-use crate::diagnose::{load, page};
 use crate::report::{FigureFormat, write_figures};
 
 /// Find what the simulation leaves out of recordings: where, which mechanism, how large, how sure.

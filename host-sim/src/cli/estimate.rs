@@ -5,19 +5,19 @@ use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 use muslip::filter::mu_slip::Range;
+use muslip_recordings::model_file::ModelFile;
+use muslip_recordings::output::{OutputError, OutputFile, write_file};
+use muslip_recordings::recording::Recording;
+use muslip_recordings::rig_file::RigFile;
 
 use super::Failure;
 use super::progress::Progress;
 use super::terminal::Terminal;
-use crate::diagnose::model_file::ModelFile;
 use crate::estimate::{
     EstimateError, EstimateOptions, EstimateResult, EstimatorKind, TraceFormat, TraceWriter,
     estimate,
 };
-use crate::output::{OutputError, OutputFile, write_file};
-use crate::recording::Recording;
 use crate::report::{CurveLabel, FigureFormat, of_estimate, write_figures};
-use crate::rig_file::RigFile;
 use crate::wording::{consistency_sentence, estimate_sentence, model_sentences, noise_sentence};
 
 /// The name that stands for standard output.

@@ -4,13 +4,13 @@ use std::path::PathBuf;
 
 use clap::Args;
 use muslip::filter::PeakEstimate;
+use muslip_recordings::recording::Recording;
+use muslip_recordings::rig_file::RigFile;
 
 use super::Failure;
 use super::progress::Progress;
 use super::terminal::Terminal;
 use crate::fit::{DEFAULT_MAXIMUM_ITERATIONS, FitResult, fit_recordings};
-use crate::recording::Recording;
-use crate::rig_file::RigFile;
 use crate::wording::verdict_sentence;
 
 /// Fit the two-parameter law to one or several recordings at once (Levenberg-Marquardt).

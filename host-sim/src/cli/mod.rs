@@ -23,11 +23,11 @@ use std::io;
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
+use muslip_recordings::input_error::{InputError, one_line};
+use muslip_recordings::output::OutputError;
 
 use crate::estimate::EstimateError;
 use crate::fit::FitJobError;
-use crate::input_error::{InputError, one_line};
-use crate::output::OutputError;
 use crate::report::{ExportError, ReportError};
 use terminal::Terminal;
 

@@ -4,11 +4,11 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use clap::Args;
+use muslip_recordings::output::{create_folder, write_file};
 
 use super::Failure;
 use super::progress::Progress;
 use super::terminal::Terminal;
-use crate::output::{create_folder, write_file};
 use crate::paper::{
     CONVERGENCE_PAGE, Paper, PaperOptions, article_markdown, convergence_page, figures,
     report_page, reproduce, work,

@@ -5,16 +5,16 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use muslip_diagnose::proof::Proof;
 use muslip_diagnose::repaired::{RepairedError, Which};
+use muslip_recordings::load;
+use muslip_recordings::model_file::ModelFile;
+use muslip_recordings::output::{OutputError, OutputFile};
+use muslip_recordings::recording::Required;
+use muslip_recordings::rig_file::RigFile;
 use serde::Serialize;
 
 use super::Failure;
 use super::terminal::Terminal;
-use crate::diagnose::load;
-use crate::diagnose::model_file::ModelFile;
 use crate::diagnose::predict::{predict, write};
-use crate::output::{OutputError, OutputFile};
-use crate::recording::Required;
-use crate::rig_file::RigFile;
 
 /// Predict the drag reading of a recording from its other columns, by a repaired model.
 ///

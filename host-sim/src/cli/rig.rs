@@ -7,11 +7,11 @@ use clap::{Args, Subcommand};
 use muslip_record::{
     Command, Event, Fault, Parameters, Profile, Program, STEPS, State, Status, Telemetry,
 };
+use muslip_recordings::input_error::one_line;
 
 use super::Failure;
 use super::rig_view::{LiveView, Seen};
 use super::terminal::Terminal;
-use crate::input_error::one_line;
 use crate::rig_link::{Port, Recorder, RigError, Session, parse_parameters, write_parameters};
 
 /// Work a rig: arm it, run a brake profile, record while it runs.

@@ -3,16 +3,16 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
+use muslip_recordings::input_error::one_line;
+use muslip_recordings::load;
+use muslip_recordings::model_file::ModelFile;
+use muslip_recordings::output::{OutputError, OutputFile};
+use muslip_recordings::recording::{Channel, RecordingWriter, Required};
+use muslip_recordings::rig_file::{self, RigFile};
 
 use super::Failure;
 use super::progress::Progress;
 use super::terminal::Terminal;
-use crate::diagnose::load;
-use crate::diagnose::model_file::ModelFile;
-use crate::input_error::one_line;
-use crate::output::{OutputError, OutputFile};
-use crate::recording::{Channel, RecordingWriter, Required};
-use crate::rig_file::{self, RigFile};
 use crate::simulate::{ModelRunError, ReplayError, RigLaw, RunError, Scenario, replay};
 
 /// Simulate a run of the rig and write the recording.

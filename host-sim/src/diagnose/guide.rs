@@ -6,12 +6,12 @@ use muslip_diagnose::campaign::Run;
 use muslip_diagnose::data::Data;
 use muslip_diagnose::mechanism::{Compensation, Id, Stage};
 use muslip_diagnose::repaired::{Repaired, RepairedError, RepairedParameter, RepairedTerm, Which};
+use muslip_recordings::load;
+use muslip_recordings::rig_file::{Brake, RigFile, Tyre, Vehicle, Wheel};
 
 use super::effects;
-use super::load;
 use super::wording::{capitalised, listed, spoken};
 use crate::report::Figure;
-use crate::rig_file::{Brake, RigFile, Tyre, Vehicle, Wheel};
 use crate::simulate::{ModelRunError, RunError, Scenario, ScenarioError};
 
 /// A line of a section.
@@ -235,7 +235,7 @@ fn rig() -> RigFile {
 }
 
 fn run_of(scenario: &Scenario, rows: &[Vec<f64>]) -> Run {
-    use crate::recording::Channel;
+    use muslip_recordings::recording::Channel;
     let column = |wanted: Channel| -> Vec<f64> {
         let place = scenario.channels().iter().position(|c| *c == wanted);
         place.map_or_else(Vec::new, |at| rows.iter().map(|row| row[at]).collect())

@@ -5,12 +5,13 @@ use std::path::Path;
 
 use muslip_diagnose::diagnose::diagnose;
 use muslip_diagnose::outcome::{Diagnosis, Fault};
+use muslip_recordings::load::Campaign;
+use muslip_recordings::model_file;
+use muslip_recordings::output::{OutputError, OutputFile, create_folder};
 
-use super::load::Campaign;
 use super::views::{Kept, Views};
 use super::wording::verdict_sentence;
-use super::{json, model_file, page};
-use crate::output::{OutputError, OutputFile, create_folder};
+use super::{json, page};
 use crate::report::ReportError;
 
 /// Names of the files, in the order in which they appear.

@@ -3,10 +3,9 @@
 use std::io::{self, Write};
 
 use muslip_diagnose::repaired::{Prediction, RepairedError, Which};
-
-use super::load::Loaded;
-use super::model_file::ModelFile;
-use crate::recording::push_exact;
+use muslip_recordings::load::Loaded;
+use muslip_recordings::model_file::ModelFile;
+use muslip_recordings::recording::push_exact;
 
 /// Predicts a recording, row by row of the file.
 ///

@@ -3,8 +3,8 @@
 use std::path::Path;
 
 use muslip_diagnose::outcome::{Diagnosis, Interval, Verdict};
+use muslip_recordings::input_error::one_line;
 
-use crate::input_error::one_line;
 use crate::text::wrapped;
 
 use super::wording::{

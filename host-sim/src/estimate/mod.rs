@@ -17,6 +17,9 @@ use muslip::filter::{Estimator, FrictionMeasurement, PeakEstimate};
 use muslip::law::rudd::Expansion;
 use muslip::sample::slip_friction;
 use muslip_diagnose::repaired::Repaired;
+use muslip_recordings::input_error::{InputError, InputProblem};
+use muslip_recordings::recording::{Recording, Row};
+use muslip_recordings::rig_file::RigFile;
 use serde::Serialize;
 use serde_json::json;
 
@@ -25,10 +28,7 @@ pub use model::{ModelUse, ModelledMechanism, Operation};
 pub use record::Record;
 pub use trace::{TraceFormat, TraceRow, TraceWriter};
 
-use crate::input_error::{InputError, InputProblem};
 use crate::measure::{FrictionNoise, Skipped, Survey, for_each_row};
-use crate::recording::{Recording, Row};
-use crate::rig_file::RigFile;
 use record::Recorder;
 
 /// Which filter estimates.

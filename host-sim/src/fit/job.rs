@@ -2,13 +2,13 @@
 
 use std::path::PathBuf;
 
+use muslip_recordings::input_error::{InputError, InputProblem};
+use muslip_recordings::recording::Recording;
+use muslip_recordings::rig_file::RigFile;
 use serde_json::json;
 
 use super::curve::{CurveFit, FitError, fit_curve, robust_start};
-use crate::input_error::{InputError, InputProblem};
 use crate::measure::{Skipped, Survey, for_each_measurement};
-use crate::recording::Recording;
-use crate::rig_file::RigFile;
 
 /// Iterations that are allowed unless the user says otherwise.
 pub const DEFAULT_MAXIMUM_ITERATIONS: usize = 100;

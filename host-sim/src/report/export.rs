@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, LazyLock};
 
+use muslip_recordings::output::{OutputError, create_folder, write_file};
 use resvg::tiny_skia::{Pixmap, Transform};
 use resvg::usvg::fontdb::Database;
 use resvg::usvg::{Options, Tree};
@@ -10,7 +11,6 @@ use resvg::usvg::{Options, Tree};
 use super::figure::Figure;
 use super::page::{Block, Report, ReportError};
 use super::svg::stand_alone;
-use crate::output::{OutputError, create_folder, write_file};
 
 /// Pixels for each unit of a figure: 1520 wide, enough for a column of print.
 const PIXELS_PER_UNIT: f32 = 2.0;

@@ -3,8 +3,7 @@
 use std::path::Path;
 
 use muslip_record::Parameters;
-
-use crate::input_error::{InputError, InputProblem, one_line, system_reason};
+use muslip_recordings::input_error::{InputError, InputProblem, one_line, system_reason};
 
 /// Names of the parameters in the order in which the controller counts them.
 const NAMES: [&str; 28] = [

@@ -5,9 +5,8 @@ use std::io;
 use std::path::Path;
 
 use muslip_record::{SAMPLE_RATE_HZ, Sample};
-
-use crate::output::OutputError;
-use crate::recording::{Channel, RecordingWriter};
+use muslip_recordings::output::OutputError;
+use muslip_recordings::recording::{Channel, RecordingWriter};
 
 /// Writes samples into a recording. Unlike other outputs it is under its name from the first line: a kill
 /// loses at most the line being written.

@@ -17,9 +17,9 @@ pub use repaired::ModelRunError;
 pub use replay::{Replay, ReplayError, replay};
 pub use sensors::Sensors;
 
-use crate::recording::Channel;
-use crate::rig_file::RigFile;
 use muslip::law::{LawError, Rudd};
+use muslip_recordings::recording::Channel;
+use muslip_recordings::rig_file::RigFile;
 
 /// Standard gravity in m/s2 (3rd General Conference on Weights and Measures, 1901).
 pub const STANDARD_GRAVITY_M_S2: f64 = 9.806_65;

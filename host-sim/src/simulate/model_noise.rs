@@ -3,11 +3,10 @@
 use std::collections::VecDeque;
 
 use muslip_diagnose::repaired::NoiseModel;
+use muslip_recordings::recording::Channel;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
-
-use crate::recording::Channel;
 
 /// A seeded stream of the noise of drag readings, at the sampling step that the model was fitted at.
 ///

@@ -19,13 +19,13 @@ use muslip_diagnose::mechanism::{Id, Mechanism, Stage, State};
 use muslip_diagnose::model::{Model, tyre};
 use muslip_diagnose::prepare::{Channel as Prepared, Series};
 use muslip_diagnose::repaired::{Repaired, RepairedError, Which};
+use muslip_recordings::recording::Channel;
 
 use super::model_noise::DragNoise;
 use super::{
     Brake, Contact, LONGEST_STEP_S, Plant, PlantEffect, PlantParameters, RigLaw, Scenario,
     ScenarioError, Sensors,
 };
-use crate::recording::Channel;
 
 /// Longest coupling step in s where the run is short, and where it is long: the whole run so far is looked at in
 /// every step.
@@ -67,7 +67,7 @@ impl Scenario {
     /// # Errors
     /// [`ScenarioError::Tyre`] if the base law of the model is none.
     pub fn of_model(
-        rig: crate::rig_file::RigFile,
+        rig: muslip_recordings::rig_file::RigFile,
         model: &Repaired,
     ) -> Result<Self, ScenarioError> {
         let [log_peak, log_critical] = [0, 1].map(|i| model.base.get(i).copied().unwrap_or(0.0));

@@ -3,13 +3,13 @@
 
 use muslip_diagnose::campaign::Run;
 use muslip_diagnose::repaired::{Repaired, RepairedError, Which};
+use muslip_recordings::load::Loaded;
+use muslip_recordings::model_file::ModelFile;
+use muslip_recordings::recording::Channel;
 
 use super::model_noise::DragNoise;
 use super::repaired::{domain, within};
-use crate::diagnose::load::Loaded;
-use crate::diagnose::model_file::ModelFile;
 use crate::diagnose::predict::predict;
-use crate::recording::Channel;
 
 /// A replayed recording.
 #[derive(Debug, Clone)]

@@ -3,11 +3,10 @@
 
 use std::collections::BTreeMap;
 
+use muslip_recordings::recording::Channel;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
-
-use crate::recording::Channel;
 
 /// The noise of a recording's channels.
 ///

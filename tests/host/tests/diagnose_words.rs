@@ -5,11 +5,12 @@ mod diagnosis;
 use std::path::Path;
 
 use diagnosis::{assert_valid, consistent, monstrous, partly_explained, with_chain};
-use host_sim::diagnose::model_file::ModelFile;
 use host_sim::diagnose::summary::{MOST_LINES, WIDEST_LINE, summary};
 use host_sim::diagnose::views::Views;
-use host_sim::diagnose::{job, json, model_file, page};
+use host_sim::diagnose::{job, json, page};
 use muslip_diagnose::outcome::{BeforeAfter, Diagnosis, Fit, LookedFor, Verdict};
+use muslip_recordings::model_file;
+use muslip_recordings::model_file::ModelFile;
 
 fn told(diagnosis: &Diagnosis) -> String {
     told_within(diagnosis, WIDEST_LINE)

@@ -7,7 +7,7 @@ use std::io::Write;
 use std::path::Path;
 
 use common::{HEADER, RIG, Scratch};
-use host_sim::recording::{Channel, Recording, Required, Run};
+use muslip_recordings::recording::{Channel, Recording, Required, Run};
 use proptest::prelude::*;
 
 fn read(contents: &[u8], required: Required) -> Result<Run, String> {
@@ -306,7 +306,7 @@ proptest! {
     ) {
         let names = HEADER.split(',').collect::<Vec<_>>();
         let mut writer =
-            host_sim::recording::RecordingWriter::new(Vec::new(), &["origin".into()], &names).unwrap();
+            muslip_recordings::recording::RecordingWriter::new(Vec::new(), &["origin".into()], &names).unwrap();
         for (index, row) in values.iter().enumerate() {
             writer.row(&[&[index as f64][..], row].concat()).unwrap();
         }

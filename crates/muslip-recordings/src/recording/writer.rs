@@ -65,7 +65,7 @@ impl<W: Write> RecordingWriter<W> {
 
 /// A number in its shortest exact form, without hundreds of zeros where it is large or small; nothing for one that
 /// is not finite.
-pub(crate) fn push_exact(text: &mut String, value: f64) {
+pub fn push_exact(text: &mut String, value: f64) {
     use std::fmt::Write as _;
     if !value.is_finite() {
         return;

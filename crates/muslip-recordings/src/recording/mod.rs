@@ -14,5 +14,4 @@ mod writer;
 pub use header::{Channel, Header, Required};
 pub use reader::{Recording, Row, Rows};
 pub use run::Run;
-pub use writer::RecordingWriter;
-pub(crate) use writer::push_exact;
+pub use writer::{RecordingWriter, push_exact};

@@ -145,7 +145,7 @@ pub(crate) fn shown(value: f64) -> String {
 }
 
 /// Replaces what would break or disguise a line of a terminal.
-pub(crate) fn one_line(text: &str) -> String {
+pub fn one_line(text: &str) -> String {
     text.split(char::is_control)
         .map(str::trim)
         .filter(|part| !part.is_empty())
@@ -154,7 +154,7 @@ pub(crate) fn one_line(text: &str) -> String {
 }
 
 /// The system's reason without the `(os error N)` that only programmers read.
-pub(crate) fn system_reason(error: &std::io::Error) -> String {
+pub fn system_reason(error: &std::io::Error) -> String {
     let text = error.to_string();
     let text = text.split(" (os error").next().unwrap_or_default();
     one_line(text).to_lowercase()
