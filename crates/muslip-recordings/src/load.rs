@@ -44,6 +44,20 @@ pub struct Loaded {
     pub faults: Vec<Fault>,
 }
 
+impl Loaded {
+    /// Times in s as the file has them: `NaN` where one was filled in, which was for a model's sake only.
+    #[must_use]
+    pub fn recorded_time_s(&self) -> Vec<f64> {
+        let mut time_s = self.run.time_s.clone();
+        for &row in &self.untimed {
+            if let Some(time) = time_s.get_mut(row) {
+                *time = f64::NAN;
+            }
+        }
+        time_s
+    }
+}
+
 /// Reads a whole recording.
 ///
 /// # Errors

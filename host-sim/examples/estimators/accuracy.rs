@@ -1,6 +1,6 @@
 //! Accuracy and consistency over a grid of curves, beside batch maximum likelihood.
 
-use host_sim::fit::Curve;
+use muslip_analysis::fit::Curve;
 
 use super::contenders::{article_run, efficient_run};
 use super::innovations::Bands;

@@ -1,6 +1,6 @@
 //! The efficient estimator under other conditions than the article's.
 
-use host_sim::fit::Curve;
+use muslip_analysis::fit::Curve;
 
 use super::accuracy::Worst;
 use super::contenders::{article_run, efficient_run, ungated_run};

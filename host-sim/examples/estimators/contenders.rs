@@ -1,8 +1,8 @@
 //! The estimators, each run over one stream.
 
-use host_sim::fit::{Curve, fit_curve};
 use muslip::filter::mu_slip::{Config as ArticleConfig, Covariance, State};
 use muslip::filter::{Estimator, FrictionMeasurement, efficient};
+use muslip_analysis::fit::{Curve, fit_curve};
 
 use super::innovations::{Innovations, Watch};
 use super::streams::{SIGMA, Stream, range};

@@ -1,7 +1,7 @@
 //! Kalman filters of other kinds, from the article's start, told the true noise.
 
-use host_sim::fit::Curve;
 use muslip::filter::mu_slip::{Covariance, State};
+use muslip_analysis::fit::Curve;
 
 use super::contenders::Outcome;
 use super::streams::{SIGMA, Stream, range};

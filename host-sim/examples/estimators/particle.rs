@@ -4,7 +4,7 @@
 //! Bayesian models", 2001): parameters do not move, so that resampling alone would soon leave a few distinct particles;
 //! after it each takes a few steps of Metropolis that leave the posterior of the samples so far as it is.
 
-use host_sim::fit::Curve;
+use muslip_analysis::fit::Curve;
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::SeedableRng;
@@ -147,7 +147,7 @@ mod tests {
     use super::particle_filter;
     use crate::posterior::{Prior, dense};
     use crate::streams::{Disturbance, article_slips, range, stream};
-    use host_sim::fit::Curve;
+    use muslip_analysis::fit::Curve;
 
     /// At mup 0.1 and sigma 0.04 the posterior is far from normal.
     #[test]

@@ -184,7 +184,7 @@ mod tests {
         let slips: Vec<f64> = (0..4000).map(|i| 0.05 + 0.1 * f64::from(i % 5)).collect();
         let law = |s: f64| 2.0 * 0.5 * s * 0.15 / (s * s + 0.15 * 0.15);
         let frictions = slips.iter().map(|&s| law(s)).collect();
-        let truth = host_sim::fit::Curve {
+        let truth = muslip_analysis::fit::Curve {
             peak_friction: 0.5,
             critical_slip: 0.15,
         };

@@ -1,7 +1,7 @@
 //! Batch fits of streams with outliers: what is attainable without being told which samples they are.
 
-use host_sim::fit::Curve;
 use muslip::filter::mu_slip::Covariance;
+use muslip_analysis::fit::Curve;
 
 use super::contenders::Outcome;
 use super::streams::{OUTLIER, SIGMA, Stream};
@@ -256,7 +256,7 @@ mod tests {
     use super::super::contenders::batch;
     use super::super::streams::{Disturbance, article_slips, stream};
     use super::{Loss, robust_run};
-    use host_sim::fit::Curve;
+    use muslip_analysis::fit::Curve;
 
     const TRUTH: Curve = Curve {
         peak_friction: 0.35,

@@ -1,7 +1,7 @@
 //! Recordings that say little: they may not make the estimator believe what they do not say.
 
-use host_sim::fit::Curve;
 use muslip::filter::{Estimator, FrictionMeasurement, efficient};
+use muslip_analysis::fit::Curve;
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::SeedableRng;

@@ -1,7 +1,7 @@
 //! The streams that all estimators are run on.
 
-use host_sim::fit::Curve;
 use muslip::filter::mu_slip::Range;
+use muslip_analysis::fit::Curve;
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::SeedableRng;

@@ -1,6 +1,6 @@
 //! What many streams have in common.
 
-use host_sim::fit::Curve;
+use muslip_analysis::fit::Curve;
 use rayon::prelude::*;
 
 use super::contenders::{Outcome, batch};

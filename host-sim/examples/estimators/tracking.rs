@@ -1,8 +1,8 @@
 //! Tracking of a change.
 
-use host_sim::fit::Curve;
 use muslip::filter::mu_slip::Range;
 use muslip::filter::{Estimator, FrictionMeasurement, efficient};
+use muslip_analysis::fit::Curve;
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::SeedableRng;

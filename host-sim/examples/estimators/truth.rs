@@ -1,8 +1,8 @@
 //! The efficient estimator beside the posterior itself.
 
-use host_sim::fit::Curve;
 use muslip::filter::efficient;
 use muslip::filter::mu_slip::Covariance;
+use muslip_analysis::fit::Curve;
 use rayon::prelude::*;
 
 use super::contenders::{batch, efficient_with_noise};

@@ -14,8 +14,9 @@ use super::Failure;
 use super::estimate::{Choices, Job};
 use super::progress::Progress;
 use super::terminal::Terminal;
-use crate::campaign::{Campaign, Run, index, page_names};
+use crate::campaign::index;
 use crate::report::{FigureFormat, write_figures};
+use muslip_analysis::campaign::{Campaign, Run, page_names};
 
 /// Estimate many recordings of one rig and compare them: a page side by side, a page each.
 ///
@@ -107,8 +108,8 @@ pub(super) fn run(arguments: &Arguments, terminal: &mut Terminal) -> Result<(), 
         terminal.line(&format!(
             "  {}: {}, at {}; stands out in {}",
             run.recording.display(),
-            crate::wording::plus_minus(run.peak_friction.0, run.peak_friction.1),
-            crate::wording::plus_minus(run.critical_slip.0, run.critical_slip.1),
+            muslip_analysis::wording::plus_minus(run.peak_friction.0, run.peak_friction.1),
+            muslip_analysis::wording::plus_minus(run.critical_slip.0, run.critical_slip.1),
             words.join(" and ")
         ))?;
     }

@@ -12,10 +12,10 @@ use super::diagnose::diagnosed;
 use super::estimate::{Job, tell};
 use super::terminal::Terminal;
 use crate::demo;
-use crate::diagnose::job;
+use crate::diagnose::files;
 use crate::diagnose::summary::{WIDEST_LINE, summary};
-use crate::estimate::{EstimateOptions, EstimatorKind};
-use crate::wording::estimate_sentence;
+use muslip_analysis::estimate::{EstimateOptions, EstimatorKind};
+use muslip_analysis::wording::estimate_sentence;
 
 /// Show both main jobs on bundled recordings: estimate a curve, find a concealed effect; write reports with plots.
 #[derive(Debug, Args)]
@@ -98,7 +98,7 @@ fn find_concealed(folder: &Path, terminal: &mut Terminal) -> Result<(), Failure>
         rig.display(),
         shown.join(" ")
     );
-    job::write(&found, &diagnosis, &views, &command)?;
+    files::write(&found, &diagnosis, &views, &command)?;
     terminal.line("")?;
     terminal.paragraph(
         "Four recordings of another rig, of other physics than the simulation: one effect was concealed in them. \

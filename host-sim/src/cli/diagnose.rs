@@ -10,7 +10,7 @@ use muslip_recordings::load;
 use super::Failure;
 use super::progress::Progress;
 use super::terminal::Terminal;
-use crate::diagnose::job::{self, WriteError};
+use crate::diagnose::files::{self, WriteError};
 use crate::diagnose::page;
 use crate::diagnose::summary::{WIDEST_LINE, summary};
 use crate::diagnose::views::Views;
@@ -51,7 +51,7 @@ const READING: f64 = 100.0;
 pub(super) fn run(arguments: &Arguments, terminal: &mut Terminal) -> Result<(), Failure> {
     let out = &arguments.out;
     let (diagnosis, views) = diagnosed(&arguments.rig, &arguments.recordings, out)?;
-    let text = job::write(out, &diagnosis, &views, &command(arguments))?;
+    let text = files::write(out, &diagnosis, &views, &command(arguments))?;
     if let Some(format) = arguments.format {
         let report = page::report(&diagnosis, &views, "");
         let figures = report.figures();
@@ -87,8 +87,8 @@ pub(super) fn diagnosed(
     let campaign = load::campaign(rig, recordings, &|share| {
         tell("read", READING * share);
     })?;
-    job::prepare_folder(out)?;
-    Ok(job::run(campaign, &|share, what| {
+    files::prepare_folder(out)?;
+    Ok(files::diagnosed(campaign, &|share, what| {
         tell(what, READING + (STEPS - READING) * share);
     }))
 }

@@ -13,12 +13,14 @@ use muslip_recordings::rig_file::RigFile;
 use super::Failure;
 use super::progress::Progress;
 use super::terminal::Terminal;
-use crate::estimate::{
+use crate::report::{CurveLabel, FigureFormat, of_estimate, write_figures};
+use muslip_analysis::estimate::{
     EstimateError, EstimateOptions, EstimateResult, EstimatorKind, TraceFormat, TraceWriter,
     estimate,
 };
-use crate::report::{CurveLabel, FigureFormat, of_estimate, write_figures};
-use crate::wording::{consistency_sentence, estimate_sentence, model_sentences, noise_sentence};
+use muslip_analysis::wording::{
+    consistency_sentence, estimate_sentence, model_sentences, noise_sentence,
+};
 
 /// The name that stands for standard output.
 const PRINTED: &str = "-";
@@ -90,7 +92,7 @@ impl Choices {
     /// The choices as arguments.
     pub(super) fn words(&self) -> String {
         let options = self.options();
-        let range = crate::estimate::range_word(options.range);
+        let range = muslip_analysis::estimate::range_word(options.range);
         match options.estimator {
             Some(estimator) => format!("--range {range} --estimator {}", estimator.word()),
             None => format!("--range {range}"),
@@ -253,7 +255,7 @@ impl Job<'_> {
         format!(
             "muslip estimate --rig {} --range {} --estimator {} {model}{}",
             self.rig_path.display(),
-            crate::estimate::range_word(self.options.range),
+            muslip_analysis::estimate::range_word(self.options.range),
             result.estimator.word(),
             self.recording_path.display()
         )

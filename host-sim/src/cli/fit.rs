@@ -10,8 +10,8 @@ use muslip_recordings::rig_file::RigFile;
 use super::Failure;
 use super::progress::Progress;
 use super::terminal::Terminal;
-use crate::fit::{DEFAULT_MAXIMUM_ITERATIONS, FitResult, fit_recordings};
-use crate::wording::verdict_sentence;
+use muslip_analysis::fit::{DEFAULT_MAXIMUM_ITERATIONS, FitResult, fit_recordings};
+use muslip_analysis::wording::verdict_sentence;
 
 /// Fit the two-parameter law to one or several recordings at once (Levenberg-Marquardt).
 ///

@@ -26,9 +26,9 @@ use clap::{Parser, Subcommand};
 use muslip_recordings::input_error::{InputError, one_line};
 use muslip_recordings::output::OutputError;
 
-use crate::estimate::EstimateError;
-use crate::fit::FitJobError;
 use crate::report::{ExportError, ReportError};
+use muslip_analysis::estimate::EstimateError;
+use muslip_analysis::fit::FitJobError;
 use terminal::Terminal;
 
 /// Exit status of bad usage and bad input.

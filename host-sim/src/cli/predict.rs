@@ -14,7 +14,7 @@ use serde::Serialize;
 
 use super::Failure;
 use super::terminal::Terminal;
-use crate::diagnose::predict::{predict, write};
+use muslip_analysis::diagnose::predict::{predict, write};
 
 /// Predict the drag reading of a recording from its other columns, by a repaired model.
 ///

@@ -8,8 +8,8 @@ use muslip_diagnose::outcome::Diagnosis;
 use muslip_diagnose::repaired::{Correction, Repaired, Which};
 
 use super::plots::interrupted;
-use super::wording::{axis_label, short_name, spoken};
 use crate::report::{Axis, Figure, Ink, Shape};
+use muslip_analysis::diagnose::wording::{axis_label, short_name, spoken};
 
 /// Length of the stretch about which a drag is shown, in s.
 const STRETCH_S: f64 = 0.8;

@@ -10,9 +10,9 @@ use muslip_recordings::load;
 use muslip_recordings::rig_file::{Brake, RigFile, Tyre, Vehicle, Wheel};
 
 use super::effects;
-use super::wording::{capitalised, listed, spoken};
 use crate::report::Figure;
 use crate::simulate::{ModelRunError, RunError, Scenario, ScenarioError};
+use muslip_analysis::diagnose::wording::{capitalised, listed, spoken};
 
 /// A line of a section.
 #[derive(Debug, Clone, PartialEq, Eq)]

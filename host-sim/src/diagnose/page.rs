@@ -10,13 +10,13 @@ use muslip_diagnose::repaired::RepairedTerm;
 
 use super::proof::proof;
 use super::views::Views;
-use super::wording::{
+use super::{effects, guide, plots};
+use crate::report::{Block, Cell, KeyFigure, Report, Row, Section, Table, Tone};
+use muslip_analysis::diagnose::wording::{
     NO_BREAK, capitalised, least, mechanism_sentence, percent, quantity, quantity_apart, range,
     short_name, sigmas, significant, spoken, stretch, unexplained_sentence, unseen, variable,
     verdict_sentence, with_unit,
 };
-use super::{effects, guide, plots};
-use crate::report::{Block, Cell, KeyFigure, Report, Row, Section, Table, Tone};
 
 /// Most rows of the tables that grow with the recordings.
 const MOST_ROWS: usize = 24;

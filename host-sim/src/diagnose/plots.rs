@@ -2,8 +2,8 @@
 
 use muslip_diagnose::outcome::{Diagnosis, Trace};
 
-use super::wording::short_name;
 use crate::report::{Axis, Figure, Ink, Shape};
+use muslip_analysis::diagnose::wording::short_name;
 
 /// Recordings drawn against time.
 const MOST_RUNS: usize = 3;

@@ -3,8 +3,8 @@
 use muslip_diagnose::outcome::{Diagnosis, Estimate, Role, Score};
 
 use super::page::{section, table};
-use super::wording::{estimate, significant, spoken, with_unit};
 use crate::report::{Block, Section};
+use muslip_analysis::diagnose::wording::{estimate, significant, spoken, with_unit};
 
 pub(super) fn proof(diagnosis: &Diagnosis) -> Section {
     let fit = &diagnosis.fit;

@@ -7,7 +7,7 @@ use muslip_recordings::input_error::one_line;
 
 use crate::text::wrapped;
 
-use super::wording::{
+use muslip_analysis::diagnose::wording::{
     capitalised, chain_sentence, confusable_sentence, either, gain, least, mechanism_sentence,
     percent, range, short_name, sigmas, significant, spoken, stretch, unexplained_sentence, unseen,
     variable, verdict_sentence, with_unit,

@@ -1,7 +1,7 @@
 //! The Cramér-Rao bound of a stream.
 
 use super::stream::{FRICTION_STD, slips};
-use crate::fit::Curve;
+use muslip_analysis::fit::Curve;
 
 /// The smallest standard deviations that an estimator without bias can have (Cramér-Rao): the roots of
 /// the diagonal of (Σ Hᵀ H / σ²)⁻¹, with H the gradient of friction at the true curve.

@@ -3,7 +3,7 @@
 use muslip::filter::mu_slip::{Covariance, State, UpdateError, update_reporting};
 use muslip::law::{LawError, Rudd, TyreLaw};
 
-use crate::fit::Curve;
+use muslip_analysis::fit::Curve;
 
 /// H = (∂mu/∂mup, ∂mu/∂sp) of the core's law.
 ///

@@ -6,11 +6,9 @@ use muslip::filter::mu_slip::{Estimate, Range, State};
 use super::exact::{equal_sensitivity_slips, slip_of_extremum};
 use super::pass::{PassError, Step, first_start, traced};
 use super::stream::{FRICTION_STD, TRUTH, frictions, slips};
-use crate::estimate::{ConsistencyTest, EstimatorKind};
-use crate::fit::Curve;
-use crate::report::{
-    Axis, Convergence, CurveLabel, Extent, Figure, Frame, Ink, Sample, Shape, Update, ellipse,
-};
+use crate::report::{Axis, Convergence, CurveLabel, Extent, Figure, Ink, Shape, ellipse};
+use muslip_analysis::estimate::{ConsistencyTest, EstimatorKind, Frame, Sample, Update};
+use muslip_analysis::fit::Curve;
 
 /// A figure with the name of its file, without ending, and the heading that it stands under.
 #[derive(Debug, Clone, PartialEq)]

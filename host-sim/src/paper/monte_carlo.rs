@@ -5,7 +5,7 @@ use muslip::filter::mu_slip::{Covariance, Estimate, Range};
 use super::pass::{self, Step, first_start, second_start};
 use super::stream::{TRUTH, frictions, slips};
 use super::yardstick::Errors;
-use crate::fit::{Curve, fit_curve};
+use muslip_analysis::fit::{Curve, fit_curve};
 
 /// The article's filter and regression on the article's curve with one seed's noise.
 #[derive(Debug, Clone, Copy, PartialEq)]

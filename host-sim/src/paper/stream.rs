@@ -4,7 +4,7 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
 
-use crate::fit::Curve;
+use muslip_analysis::fit::Curve;
 
 /// Points of a stream.
 pub const POINTS: usize = 41;

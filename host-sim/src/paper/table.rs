@@ -6,8 +6,8 @@ use super::statement::{Ours, Statement};
 use super::statistics::Band;
 use super::yardstick::{Accuracy, Cell, Contender};
 use super::{Paper, PaperOptions};
-use crate::estimate::range_word;
 use crate::text::Table;
+use muslip_analysis::estimate::range_word;
 
 fn joined(peak: [String; 3], slip: [String; 3]) -> [String; 6] {
     let ([a, b, c], [d, e, f]) = (peak, slip);

@@ -5,7 +5,7 @@ use muslip::filter::mu_slip::{Estimate, Range};
 use super::bound::Bound;
 use super::pass::{finished, first_start, second_start};
 use super::stream::{frictions, slips};
-use crate::fit::{Curve, fit_curve};
+use muslip_analysis::fit::{Curve, fit_curve};
 
 /// Who estimates.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

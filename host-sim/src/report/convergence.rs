@@ -3,79 +3,16 @@
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD as BASE64;
 use muslip::filter::PeakEstimate;
-use muslip::filter::mu_slip::Fusion;
 use serde_json::{Value, json};
 
 use super::axis::{Axis, Extent};
 use super::figure::{Figure, Ink, Live, Shape, ellipse};
 use super::spec::rounded;
-use crate::estimate::{Consistency, EstimatorKind};
-use crate::fit::Curve;
+use muslip_analysis::estimate::{Consistency, EstimatorKind, Frame, Sample, Update};
+use muslip_analysis::fit::Curve;
 
 /// The core as WebAssembly, in base64; empty where the toolchain could not build it.
 const CORE: &str = include_str!(concat!(env!("OUT_DIR"), "/muslip_wasm.base64"));
-
-/// One frame: the estimate after a measurement, and what that measurement did.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Frame {
-    /// Measurements so far, those refused included; 0 at the start.
-    pub sample: u64,
-    /// The estimate.
-    pub peak: PeakEstimate<f64>,
-    /// The measurement; `None` at the start.
-    pub update: Option<Update>,
-}
-
-/// A measurement and what it did.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Update {
-    /// Time in s; not finite where there is none.
-    pub time_s: f64,
-    /// Measured slip.
-    pub slip: f64,
-    /// Measured friction.
-    pub friction: f64,
-    /// Measured minus predicted friction.
-    pub innovation: f64,
-    /// Its variance.
-    pub innovation_variance: f64,
-    /// Normalised innovation squared.
-    pub nis: f64,
-    /// Noise variance of the measurement as the filter took it.
-    pub noise_variance: f64,
-    /// H P H' before the update.
-    pub signal_before: f64,
-    /// H P H' after it.
-    pub signal_after: f64,
-}
-
-impl Update {
-    /// What a filter says of a measurement at a time.
-    pub fn new(time_s: f64, fusion: &Fusion<f64>) -> Self {
-        Self {
-            time_s,
-            slip: fusion.slip_ratio,
-            friction: fusion.measured_friction,
-            innovation: fusion.innovation,
-            innovation_variance: fusion.innovation_variance,
-            nis: fusion.nis,
-            noise_variance: fusion.noise_variance,
-            signal_before: fusion.signal_before,
-            signal_after: fusion.signal_after,
-        }
-    }
-}
-
-/// One measurement as the filter took it.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Sample {
-    /// Slip.
-    pub slip: f64,
-    /// Friction.
-    pub friction: f64,
-    /// Standard deviation of the friction's noise.
-    pub friction_std: f64,
-}
 
 /// A run.
 #[derive(Debug, Clone, PartialEq)]

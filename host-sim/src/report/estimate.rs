@@ -3,12 +3,12 @@
 use std::path::Path;
 
 use super::axis::{Axis, Extent};
-use super::convergence::{Convergence, CurveLabel, Frame, Update};
+use super::convergence::{Convergence, CurveLabel};
 use super::figure::{Figure, Ink, Live, Shape};
 use super::page::{Block, KeyFigure, Report, Section, Tone};
 use super::table::Table;
-use crate::estimate::{EstimateResult, Verdict, range_word};
-use crate::wording::{
+use muslip_analysis::estimate::{EstimateResult, Frame, Update, Verdict, range_word};
+use muslip_analysis::wording::{
     consistency_sentence, estimate_sentence, model_sentences, noise_sentence, plus_minus,
 };
 

@@ -19,7 +19,7 @@ pub mod svg;
 mod table;
 
 pub use axis::{Axis, Extent, Scale};
-pub use convergence::{Convergence, CurveLabel, Frame, Sample, Update, drawn_slips};
+pub use convergence::{Convergence, CurveLabel, drawn_slips};
 pub use estimate::of_estimate;
 pub use export::{ExportError, FigureFormat, write_figures};
 pub use figure::{Cells, Figure, Ink, Layer, Live, Shape, ellipse};

@@ -254,7 +254,8 @@ impl PageData {
         let start = convergence.frames.first().map(|frame| frame.peak);
         let what_if = start.filter(|_| self.core.is_some()).map(|start| WhatIf {
             about: &convergence.about_what_if,
-            efficient: convergence.again == Some(crate::estimate::EstimatorKind::Efficient),
+            efficient: convergence.again
+                == Some(muslip_analysis::estimate::EstimatorKind::Efficient),
             peak_friction: start.peak_friction,
             critical_slip: start.critical_slip,
         });

@@ -9,7 +9,6 @@ use muslip_recordings::recording::Channel;
 
 use super::model_noise::DragNoise;
 use super::repaired::{domain, within};
-use crate::diagnose::predict::predict;
 
 /// A replayed recording.
 #[derive(Debug, Clone)]
@@ -48,8 +47,7 @@ pub fn replay(
     let repaired = &model.repaired;
     let run = &loaded.run;
     let outside = rows_outside(repaired, run)?;
-    let prediction = predict(model, loaded, Which::Repaired)?;
-    let mut drag = prediction.drag_force_n;
+    let mut drag = repaired.predict(run, Which::Repaired)?.drag_force_n;
     if let Some(seed) = seed {
         let mut noise = DragNoise::new(&repaired.noise, seed);
         let sigma = repaired.reading_sigma(run, &drag);
@@ -63,7 +61,7 @@ pub fn replay(
         names.push(name.to_owned());
         columns.push(column);
     };
-    put(Channel::Time.name(), prediction.time_s);
+    put(Channel::Time.name(), loaded.recorded_time_s());
     put(Channel::WheelSpeed.name(), run.wheel_speed_rad_s.clone());
     put(Channel::VehicleSpeed.name(), run.vehicle_speed_m_s.clone());
     put(Channel::DragForce.name(), drag);

@@ -59,7 +59,7 @@ fn both_sensitivities_are_equally_large_at_one_point_on_either_side_of_the_peak(
         .count();
     assert_eq!(changes, 2);
     assert_eq!(
-        host_sim::paper::equal_sensitivity_slips(host_sim::fit::Curve {
+        host_sim::paper::equal_sensitivity_slips(muslip_analysis::fit::Curve {
             peak_friction: 0.1,
             critical_slip: 0.15
         }),

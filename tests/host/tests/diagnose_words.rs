@@ -7,7 +7,8 @@ use std::path::Path;
 use diagnosis::{assert_valid, consistent, monstrous, partly_explained, with_chain};
 use host_sim::diagnose::summary::{MOST_LINES, WIDEST_LINE, summary};
 use host_sim::diagnose::views::Views;
-use host_sim::diagnose::{job, json, page};
+use host_sim::diagnose::{files, page};
+use muslip_analysis::diagnose::json;
 use muslip_diagnose::outcome::{BeforeAfter, Diagnosis, Fit, LookedFor, Verdict};
 use muslip_recordings::model_file;
 use muslip_recordings::model_file::ModelFile;
@@ -210,19 +211,19 @@ fn a_column_named_like_markup_is_text_in_the_report() {
 fn a_failure_to_write_leaves_what_was_there() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("found");
-    job::write(&out, &consistent(), &Views::default(), "first").unwrap();
+    files::write(&out, &consistent(), &Views::default(), "first").unwrap();
     let before = read_all(&out);
     assert_eq!(
         before
             .iter()
             .map(|(name, _)| name.as_str())
             .collect::<Vec<_>>(),
-        job::FILES
+        files::FILES
     );
     // The last of the three cannot be made: a folder has its name.
     std::fs::remove_file(out.join("report.html")).unwrap();
     std::fs::create_dir(out.join("report.html")).unwrap();
-    let error = job::write(&out, &partly_explained(), &Views::default(), "second").unwrap_err();
+    let error = files::write(&out, &partly_explained(), &Views::default(), "second").unwrap_err();
     assert!(
         error
             .to_string()

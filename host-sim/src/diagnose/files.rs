@@ -1,17 +1,17 @@
-//! The whole of `muslip diagnose`: read everything, run the engine, write three files together.
+//! The files of a diagnosis: made together or not at all.
 
 use std::io::Write as _;
 use std::path::Path;
 
-use muslip_diagnose::diagnose::diagnose;
-use muslip_diagnose::outcome::{Diagnosis, Fault};
+use muslip_analysis::diagnose::wording::verdict_sentence;
+use muslip_analysis::diagnose::{job, json};
+use muslip_diagnose::outcome::Diagnosis;
 use muslip_recordings::load::Campaign;
 use muslip_recordings::model_file;
 use muslip_recordings::output::{OutputError, OutputFile, create_folder};
 
+use super::page;
 use super::views::{Kept, Views};
-use super::wording::verdict_sentence;
-use super::{json, page};
 use crate::report::ReportError;
 
 /// Names of the files, in the order in which they appear.
@@ -31,22 +31,13 @@ pub enum WriteError {
     Text(String),
 }
 
-/// Runs the engine on a campaign, which is given up to it but for what the report shows. What had to be mended to read them joins the faults of the data.
+/// Runs the engine on a campaign, which is given up to it but for what the report shows.
 #[must_use]
-pub fn run(campaign: Campaign, progress: &(dyn Fn(f64, &str) + Sync)) -> (Diagnosis, Views) {
-    let Campaign { rig, runs, faults } = campaign;
-    let kept = Kept::of(&runs);
-    let mut diagnosis = diagnose(&rig, runs, progress);
+pub fn diagnosed(campaign: Campaign, progress: &(dyn Fn(f64, &str) + Sync)) -> (Diagnosis, Views) {
+    let kept = Kept::of(&campaign.runs);
+    let diagnosis = job::run(campaign, progress);
     let views = Views::of(&diagnosis, &kept);
-    add_faults(&mut diagnosis, faults);
-    json::make_finite(&mut diagnosis);
     (diagnosis, views)
-}
-
-/// Faults of reading stand before those of content.
-fn add_faults(diagnosis: &mut Diagnosis, mut faults: Vec<Fault>) {
-    faults.append(&mut diagnosis.data_faults);
-    diagnosis.data_faults = faults;
 }
 
 /// Makes the folder, and finds out whether it can be written, before the work is done.

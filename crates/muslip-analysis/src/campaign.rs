@@ -1,12 +1,8 @@
 //! Many recordings of one rig side by side: which of them stand out.
 
-mod page;
-
 use std::path::{Path, PathBuf};
 
 use crate::estimate::{EstimateResult, Verdict};
-
-pub use page::index;
 
 /// Fewest runs among which one can stand out.
 const FEWEST: usize = 5;

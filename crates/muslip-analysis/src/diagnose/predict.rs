@@ -17,12 +17,7 @@ pub fn predict(
     which: Which,
 ) -> Result<Prediction, RepairedError> {
     let mut prediction = model.repaired.predict(&loaded.run, which)?;
-    // A time that the file leaves out was filled in for the model's sake only.
-    for &row in &loaded.untimed {
-        if let Some(time) = prediction.time_s.get_mut(row) {
-            *time = f64::NAN;
-        }
-    }
+    prediction.time_s = loaded.recorded_time_s();
     Ok(prediction)
 }
 

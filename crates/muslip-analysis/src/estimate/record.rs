@@ -3,7 +3,6 @@
 use muslip::filter::mu_slip::Fusion;
 use muslip::filter::{FrictionMeasurement, PeakEstimate};
 
-use crate::report::{Frame, Sample, Update};
 use crate::thin::Thinned;
 
 /// Measurements that are kept.
@@ -12,6 +11,68 @@ const KEPT_SAMPLES: usize = 20_000;
 const FIRST_FRAMES: u64 = 60;
 /// ... and an even selection of the later ones.
 const LATER_FRAMES: usize = 500;
+
+/// One frame: the estimate after a measurement, and what that measurement did.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Frame {
+    /// Measurements so far, those refused included; 0 at the start.
+    pub sample: u64,
+    /// The estimate.
+    pub peak: PeakEstimate<f64>,
+    /// The measurement; `None` at the start.
+    pub update: Option<Update>,
+}
+
+/// A measurement and what it did.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Update {
+    /// Time in s; not finite where there is none.
+    pub time_s: f64,
+    /// Measured slip.
+    pub slip: f64,
+    /// Measured friction.
+    pub friction: f64,
+    /// Measured minus predicted friction.
+    pub innovation: f64,
+    /// Its variance.
+    pub innovation_variance: f64,
+    /// Normalised innovation squared.
+    pub nis: f64,
+    /// Noise variance of the measurement as the filter took it.
+    pub noise_variance: f64,
+    /// H P H' before the update.
+    pub signal_before: f64,
+    /// H P H' after it.
+    pub signal_after: f64,
+}
+
+impl Update {
+    /// What a filter says of a measurement at a time.
+    pub fn new(time_s: f64, fusion: &Fusion<f64>) -> Self {
+        Self {
+            time_s,
+            slip: fusion.slip_ratio,
+            friction: fusion.measured_friction,
+            innovation: fusion.innovation,
+            innovation_variance: fusion.innovation_variance,
+            nis: fusion.nis,
+            noise_variance: fusion.noise_variance,
+            signal_before: fusion.signal_before,
+            signal_after: fusion.signal_after,
+        }
+    }
+}
+
+/// One measurement as the filter took it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Sample {
+    /// Slip.
+    pub slip: f64,
+    /// Friction.
+    pub friction: f64,
+    /// Standard deviation of the friction's noise.
+    pub friction_std: f64,
+}
 
 /// A run's frames and measurements.
 #[derive(Debug, Clone, PartialEq)]

@@ -25,7 +25,7 @@ use serde_json::json;
 
 pub use consistency::{Consistency, ConsistencyTest, Verdict, mean_nis_band};
 pub use model::{ModelUse, ModelledMechanism, Operation};
-pub use record::Record;
+pub use record::{Frame, Record, Sample, Update};
 pub use trace::{TraceFormat, TraceRow, TraceWriter};
 
 use crate::measure::{FrictionNoise, Skipped, Survey, for_each_row};

@@ -1,11 +1,11 @@
 //! The campaign's page.
 
-use super::Campaign;
 use crate::report::{
     Axis, Block, Cell, Extent, Figure, Ink, KeyFigure, Report, Row, Section, Shape, Table, Tone,
     ellipse,
 };
-use crate::wording::plus_minus;
+use muslip_analysis::campaign::{Campaign, Run};
+use muslip_analysis::wording::plus_minus;
 
 /// The page that compares the runs and links to theirs. `rig` is the rig file as the user named it.
 pub fn index(campaign: &Campaign, rig: &str, command: &str) -> Report {
@@ -69,30 +69,29 @@ const MOST_ELLIPSES: usize = 20;
 
 fn figures(campaign: &Campaign) -> [Figure; 3] {
     let last = campaign.runs.len() as f64;
-    let against_number =
-        |caption: &str, label: &str, name: &str, of: fn(&super::Run) -> (f64, f64)| {
-            let values = || {
-                (1u32..)
-                    .zip(&campaign.runs)
-                    .map(|(n, run)| (f64::from(n), of(run)))
-            };
-            let bars = values()
-                .flat_map(|(x, (value, std))| [(x, value - std), (x, value + std), (x, f64::NAN)])
-                .collect();
-            with_runs(
-                Figure::new(
-                    caption,
-                    Axis::new("run, in the order given").over(Extent::Fixed(0.5, last + 0.5)),
-                    Axis::new(label),
-                )
-                .named(name)
-                .with(Ink::Reference, "1-sigma", Shape::Line(bars)),
-                campaign,
-                &values()
-                    .map(|(x, (value, _))| (x, value))
-                    .collect::<Vec<_>>(),
-            )
+    let against_number = |caption: &str, label: &str, name: &str, of: fn(&Run) -> (f64, f64)| {
+        let values = || {
+            (1u32..)
+                .zip(&campaign.runs)
+                .map(|(n, run)| (f64::from(n), of(run)))
         };
+        let bars = values()
+            .flat_map(|(x, (value, std))| [(x, value - std), (x, value + std), (x, f64::NAN)])
+            .collect();
+        with_runs(
+            Figure::new(
+                caption,
+                Axis::new("run, in the order given").over(Extent::Fixed(0.5, last + 0.5)),
+                Axis::new(label),
+            )
+            .named(name)
+            .with(Ink::Reference, "1-sigma", Shape::Line(bars)),
+            campaign,
+            &values()
+                .map(|(x, (value, _))| (x, value))
+                .collect::<Vec<_>>(),
+        )
+    };
     let peak = against_number(
         "Peak friction of each run with its 1-sigma.",
         "peak friction",
