@@ -1,11 +1,12 @@
 //! The campaign's page.
 
+use muslip_analysis::campaign::{Campaign, Run};
+use muslip_analysis::wording::plus_minus;
+
 use crate::report::{
     Axis, Block, Cell, Extent, Figure, Ink, KeyFigure, Report, Row, Section, Shape, Table, Tone,
     ellipse,
 };
-use muslip_analysis::campaign::{Campaign, Run};
-use muslip_analysis::wording::plus_minus;
 
 /// The page that compares the runs and links to theirs. `rig` is the rig file as the user named it.
 pub fn index(campaign: &Campaign, rig: &str, command: &str) -> Report {

@@ -5,8 +5,6 @@ pub mod campaign;
 pub mod cli;
 pub mod demo;
 pub mod diagnose;
-pub mod paper;
-pub mod quarter_car;
 pub mod report;
 pub mod rig_link;
 pub mod simulate;

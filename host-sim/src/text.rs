@@ -1,5 +1,22 @@
 //! Text for a terminal: running text and tables, within a width.
 
+use std::io;
+
+/// Narrowest terminal that lines are broken for.
+const NARROWEST: usize = 40;
+
+/// Columns of the terminal, or as many as `COLUMNS` says; `None` in a pipe or a file otherwise.
+#[must_use]
+pub fn columns() -> Option<usize> {
+    let told = std::env::var("COLUMNS").ok();
+    let told = told.and_then(|columns| columns.parse().ok());
+    let columns: Option<usize> = told.filter(|columns| *columns > 0).or_else(|| {
+        let (columns, _) = terminal_size::terminal_size_of(io::stdout())?;
+        Some(usize::from(columns.0))
+    });
+    columns.map(|columns| columns.max(NARROWEST))
+}
+
 /// Lines of at most `width` characters, broken at spaces and nowhere else: a longer word stays whole, and a
 /// no-break space holds a number and its unit together.
 #[must_use]

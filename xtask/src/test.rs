@@ -12,7 +12,7 @@ use crate::step::{cargo, run, step};
 use crate::trial;
 
 /// Packages whose `#[ignore]`d tests are long rather than broken: run in release.
-const LONG_TESTS: &[&str] = &["muslip", "host-tests"];
+const LONG_TESTS: &[&str] = &["muslip", "host-tests", "study-quarter-car"];
 
 /// Feature sets of the core; neither may change whether it builds.
 const CORE_FEATURES: [&str; 4] = ["", "defmt", "serde", "defmt,serde"];

@@ -5,6 +5,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, PoisonError};
 
 use clap::Args;
+use muslip_analysis::campaign::{Campaign, Run, page_names};
 use muslip_recordings::output::{StagedFolder, write_file};
 use muslip_recordings::recording::Recording;
 use rayon::prelude::*;
@@ -16,7 +17,6 @@ use super::progress::Progress;
 use super::terminal::Terminal;
 use crate::campaign::index;
 use crate::report::{FigureFormat, write_figures};
-use muslip_analysis::campaign::{Campaign, Run, page_names};
 
 /// Estimate many recordings of one rig and compare them: a page side by side, a page each.
 ///

@@ -4,6 +4,8 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use muslip::filter::mu_slip::Range;
+use muslip_analysis::estimate::{EstimateOptions, EstimatorKind};
+use muslip_analysis::wording::estimate_sentence;
 use muslip_diagnose::outcome::Diagnosis;
 use muslip_recordings::output::{create_folder, write_file};
 
@@ -14,8 +16,6 @@ use super::terminal::Terminal;
 use crate::demo;
 use crate::diagnose::files;
 use crate::diagnose::summary::{WIDEST_LINE, summary};
-use muslip_analysis::estimate::{EstimateOptions, EstimatorKind};
-use muslip_analysis::wording::estimate_sentence;
 
 /// Show both main jobs on bundled recordings: estimate a curve, find a concealed effect; write reports with plots.
 #[derive(Debug, Args)]

@@ -5,6 +5,13 @@ use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 use muslip::filter::mu_slip::Range;
+use muslip_analysis::estimate::{
+    EstimateError, EstimateOptions, EstimateResult, EstimatorKind, TraceFormat, TraceWriter,
+    estimate,
+};
+use muslip_analysis::wording::{
+    consistency_sentence, estimate_sentence, model_sentences, noise_sentence,
+};
 use muslip_recordings::model_file::ModelFile;
 use muslip_recordings::output::{OutputError, OutputFile, write_file};
 use muslip_recordings::recording::Recording;
@@ -14,13 +21,6 @@ use super::Failure;
 use super::progress::Progress;
 use super::terminal::Terminal;
 use crate::report::{CurveLabel, FigureFormat, of_estimate, write_figures};
-use muslip_analysis::estimate::{
-    EstimateError, EstimateOptions, EstimateResult, EstimatorKind, TraceFormat, TraceWriter,
-    estimate,
-};
-use muslip_analysis::wording::{
-    consistency_sentence, estimate_sentence, model_sentences, noise_sentence,
-};
 
 /// The name that stands for standard output.
 const PRINTED: &str = "-";

@@ -3,13 +3,13 @@
 use std::path::PathBuf;
 
 use clap::Args;
+use muslip_analysis::diagnose::wording::either;
 use muslip_diagnose::mechanism::Id;
 
 use super::Failure;
 use super::terminal::Terminal;
 use crate::diagnose::guide::{GuideError, markdown, named, near, pictures, section};
 use crate::report::{FigureFormat, write_figures};
-use muslip_analysis::diagnose::wording::either;
 
 /// Explain a mechanism that a diagnosis may name: physics, equation, look-alikes and the run that tells them apart.
 ///

@@ -4,14 +4,14 @@ use std::path::PathBuf;
 
 use clap::Args;
 use muslip::filter::PeakEstimate;
+use muslip_analysis::fit::{DEFAULT_MAXIMUM_ITERATIONS, FitResult, fit_recordings};
+use muslip_analysis::wording::verdict_sentence;
 use muslip_recordings::recording::Recording;
 use muslip_recordings::rig_file::RigFile;
 
 use super::Failure;
 use super::progress::Progress;
 use super::terminal::Terminal;
-use muslip_analysis::fit::{DEFAULT_MAXIMUM_ITERATIONS, FitResult, fit_recordings};
-use muslip_analysis::wording::verdict_sentence;
 
 /// Fit the two-parameter law to one or several recordings at once (Levenberg-Marquardt).
 ///

@@ -10,10 +10,8 @@ mod diagnose;
 mod estimate;
 mod explain;
 mod fit;
-mod paper;
 mod predict;
 mod progress;
-mod quarter_car;
 mod rig;
 mod rig_view;
 mod simulate;
@@ -23,12 +21,12 @@ use std::io;
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
+use muslip_analysis::estimate::EstimateError;
+use muslip_analysis::fit::FitJobError;
 use muslip_recordings::input_error::{InputError, one_line};
 use muslip_recordings::output::OutputError;
 
 use crate::report::{ExportError, ReportError};
-use muslip_analysis::estimate::EstimateError;
-use muslip_analysis::fit::FitJobError;
 use terminal::Terminal;
 
 /// Exit status of bad usage and bad input.
@@ -53,8 +51,6 @@ enum Command {
     Predict(predict::Arguments),
     Explain(explain::Arguments),
     Simulate(simulate::Arguments),
-    Paper(paper::Arguments),
-    QuarterCar(quarter_car::Arguments),
     Demo(demo::Arguments),
     Rig(rig::Arguments),
     Completions(completions::Arguments),
@@ -123,8 +119,6 @@ pub fn main() -> ExitCode {
         Command::Predict(arguments) => predict::run(&arguments, &mut terminal),
         Command::Explain(arguments) => explain::run(&arguments, &mut terminal),
         Command::Simulate(arguments) => simulate::run(&arguments, &mut terminal),
-        Command::Paper(arguments) => paper::run(&arguments, &mut terminal),
-        Command::QuarterCar(arguments) => quarter_car::run(&arguments, &mut terminal),
         Command::Demo(arguments) => demo::run(&arguments, &mut terminal),
         Command::Rig(arguments) => rig::run(&arguments, &mut terminal),
         Command::Completions(arguments) => completions::run(&arguments, &mut terminal),

@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
+use muslip_analysis::diagnose::predict::{predict, write};
 use muslip_diagnose::proof::Proof;
 use muslip_diagnose::repaired::{RepairedError, Which};
 use muslip_recordings::load;
@@ -14,7 +15,6 @@ use serde::Serialize;
 
 use super::Failure;
 use super::terminal::Terminal;
-use muslip_analysis::diagnose::predict::{predict, write};
 
 /// Predict the drag reading of a recording from its other columns, by a repaired model.
 ///

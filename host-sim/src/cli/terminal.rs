@@ -5,12 +5,10 @@ use std::io::{self, IsTerminal, Write};
 use clap::builder::styling::{AnsiColor, Style};
 
 use super::Failure;
-use crate::text::{Table, wrapped};
+use crate::text::{columns, wrapped};
 
 /// Widest line of running text.
 const WIDEST_LINE: usize = 84;
-/// Narrowest terminal that lines are broken for.
-const NARROWEST: usize = 40;
 
 /// Standard output. Colours and bold only where it is a terminal and `NO_COLOR` does not forbid them.
 pub(super) struct Terminal {
@@ -21,15 +19,9 @@ pub(super) struct Terminal {
 
 impl Terminal {
     pub(super) fn new() -> Self {
-        let told = std::env::var("COLUMNS").ok();
-        let told = told.and_then(|columns| columns.parse().ok());
-        let columns: Option<usize> = told.filter(|columns| *columns > 0).or_else(|| {
-            let (columns, _) = terminal_size::terminal_size_of(io::stdout())?;
-            Some(usize::from(columns.0))
-        });
         Self {
             out: anstream::AutoStream::auto(io::stdout()),
-            columns: columns.map(|columns| columns.max(NARROWEST)),
+            columns: columns(),
         }
     }
 
@@ -92,14 +84,6 @@ impl Terminal {
             }
         }
         Ok(())
-    }
-
-    /// Prints a table of many columns, and an empty line.
-    pub(super) fn wide_table(&mut self, table: &Table) -> Result<(), Failure> {
-        for line in table.lines(self.columns) {
-            self.line(&line)?;
-        }
-        self.line("")
     }
 
     /// Prints JSON and nothing else.

@@ -1,5 +1,6 @@
 //! Pictures of what each mechanism of a repaired model does, made from recordings.
 
+use muslip_analysis::diagnose::wording::{axis_label, short_name, spoken};
 use muslip_diagnose::campaign::Run;
 use muslip_diagnose::chain::correct::Lateness;
 use muslip_diagnose::imbalance::{Against, Imbalance, Instant};
@@ -9,7 +10,6 @@ use muslip_diagnose::repaired::{Correction, Repaired, Which};
 
 use super::plots::interrupted;
 use crate::report::{Axis, Figure, Ink, Shape};
-use muslip_analysis::diagnose::wording::{axis_label, short_name, spoken};
 
 /// Length of the stretch about which a drag is shown, in s.
 const STRETCH_S: f64 = 0.8;

@@ -2,6 +2,7 @@
 
 use std::fmt::Write as _;
 
+use muslip_analysis::diagnose::wording::{capitalised, listed, spoken};
 use muslip_diagnose::campaign::Run;
 use muslip_diagnose::data::Data;
 use muslip_diagnose::mechanism::{Compensation, Id, Stage};
@@ -12,7 +13,6 @@ use muslip_recordings::rig_file::{Brake, RigFile, Tyre, Vehicle, Wheel};
 use super::effects;
 use crate::report::Figure;
 use crate::simulate::{ModelRunError, RunError, Scenario, ScenarioError};
-use muslip_analysis::diagnose::wording::{capitalised, listed, spoken};
 
 /// A line of a section.
 #[derive(Debug, Clone, PartialEq, Eq)]

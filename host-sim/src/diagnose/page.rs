@@ -2,6 +2,11 @@
 
 use std::collections::BTreeMap;
 
+use muslip_analysis::diagnose::wording::{
+    NO_BREAK, capitalised, least, mechanism_sentence, percent, quantity, quantity_apart, range,
+    short_name, sigmas, significant, spoken, stretch, unexplained_sentence, unseen, variable,
+    verdict_sentence, with_unit,
+};
 use muslip_diagnose::mechanism::Id;
 use muslip_diagnose::outcome::{
     Diagnosis, Interval, MinimumDetectable, NamedMechanism, Role, Verdict,
@@ -12,11 +17,6 @@ use super::proof::proof;
 use super::views::Views;
 use super::{effects, guide, plots};
 use crate::report::{Block, Cell, KeyFigure, Report, Row, Section, Table, Tone};
-use muslip_analysis::diagnose::wording::{
-    NO_BREAK, capitalised, least, mechanism_sentence, percent, quantity, quantity_apart, range,
-    short_name, sigmas, significant, spoken, stretch, unexplained_sentence, unseen, variable,
-    verdict_sentence, with_unit,
-};
 
 /// Most rows of the tables that grow with the recordings.
 const MOST_ROWS: usize = 24;

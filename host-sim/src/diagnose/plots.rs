@@ -1,9 +1,9 @@
 //! The figures of a diagnosis's report.
 
+use muslip_analysis::diagnose::wording::short_name;
 use muslip_diagnose::outcome::{Diagnosis, Trace};
 
 use crate::report::{Axis, Figure, Ink, Shape};
-use muslip_analysis::diagnose::wording::short_name;
 
 /// Recordings drawn against time.
 const MOST_RUNS: usize = 3;

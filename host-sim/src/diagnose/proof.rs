@@ -1,10 +1,10 @@
 //! How much better the repaired model predicts: a section of the report.
 
+use muslip_analysis::diagnose::wording::{estimate, significant, spoken, with_unit};
 use muslip_diagnose::outcome::{Diagnosis, Estimate, Role, Score};
 
 use super::page::{section, table};
 use crate::report::{Block, Section};
-use muslip_analysis::diagnose::wording::{estimate, significant, spoken, with_unit};
 
 pub(super) fn proof(diagnosis: &Diagnosis) -> Section {
     let fit = &diagnosis.fit;

@@ -2,16 +2,15 @@
 
 use std::path::Path;
 
-use muslip_diagnose::outcome::{Diagnosis, Interval, Verdict};
-use muslip_recordings::input_error::one_line;
-
-use crate::text::wrapped;
-
 use muslip_analysis::diagnose::wording::{
     capitalised, chain_sentence, confusable_sentence, either, gain, least, mechanism_sentence,
     percent, range, short_name, sigmas, significant, spoken, stretch, unexplained_sentence, unseen,
     variable, verdict_sentence, with_unit,
 };
+use muslip_diagnose::outcome::{Diagnosis, Interval, Verdict};
+use muslip_recordings::input_error::one_line;
+
+use crate::text::wrapped;
 
 /// Most lines of a summary.
 pub const MOST_LINES: usize = 25;

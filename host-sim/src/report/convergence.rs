@@ -3,13 +3,13 @@
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD as BASE64;
 use muslip::filter::PeakEstimate;
+use muslip_analysis::estimate::{Consistency, EstimatorKind, Frame, Sample, Update};
+use muslip_analysis::fit::Curve;
 use serde_json::{Value, json};
 
 use super::axis::{Axis, Extent};
 use super::figure::{Figure, Ink, Live, Shape, ellipse};
 use super::spec::rounded;
-use muslip_analysis::estimate::{Consistency, EstimatorKind, Frame, Sample, Update};
-use muslip_analysis::fit::Curve;
 
 /// The core as WebAssembly, in base64; empty where the toolchain could not build it.
 const CORE: &str = include_str!(concat!(env!("OUT_DIR"), "/muslip_wasm.base64"));

@@ -2,15 +2,16 @@
 
 use std::path::Path;
 
+use muslip_analysis::estimate::{EstimateResult, Frame, Update, Verdict, range_word};
+use muslip_analysis::wording::{
+    consistency_sentence, estimate_sentence, model_sentences, noise_sentence, plus_minus,
+};
+
 use super::axis::{Axis, Extent};
 use super::convergence::{Convergence, CurveLabel};
 use super::figure::{Figure, Ink, Live, Shape};
 use super::page::{Block, KeyFigure, Report, Section, Tone};
 use super::table::Table;
-use muslip_analysis::estimate::{EstimateResult, Frame, Update, Verdict, range_word};
-use muslip_analysis::wording::{
-    consistency_sentence, estimate_sentence, model_sentences, noise_sentence, plus_minus,
-};
 
 /// The report of an estimate: the curve, how the estimate settled, whether to believe it.
 ///
