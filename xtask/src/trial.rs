@@ -49,7 +49,7 @@ pub fn play(arguments: &[String]) -> Result<()> {
             "--locked",
             "--quiet",
             "--package",
-            "host-sim",
+            "muslip-cli",
             "--package",
             "sealed-trial",
         ]),

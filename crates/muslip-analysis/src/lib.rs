@@ -18,7 +18,7 @@
 //! let rig = folder.path().join("rig.toml");
 //! std::fs::write(
 //!     &rig,
-//!     "[wheel]\nradius_m = 0.31\ninertia_kg_m2 = 1.25\n[vehicle]\nmass_kg = 420.0\n\
+//!     "[wheel]\nradius_m = 0.31\ninertia_kg_m2 = 1.25\n[vehicle]\nmass_kg = 420.0\ncoasting = true\n\
 //!      [tyre]\nlaw = \"rudd\"\npeak_friction = 0.85\ncritical_slip = 0.14\n",
 //! )?;
 //!

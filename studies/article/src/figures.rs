@@ -1,10 +1,10 @@
 //! The article's figures, drawn from one stream.
 
-use host_sim::report::{Axis, Convergence, CurveLabel, Extent, Figure, Ink, Shape, ellipse};
 use muslip::filter::PeakEstimate;
 use muslip::filter::mu_slip::{Estimate, Range, State};
 use muslip_analysis::estimate::{ConsistencyTest, EstimatorKind, Frame, Sample, Update};
 use muslip_analysis::fit::Curve;
+use muslip_report::{Axis, Convergence, CurveLabel, Extent, Figure, Ink, Shape, ellipse};
 
 use super::exact::{equal_sensitivity_slips, slip_of_extremum};
 use super::pass::{PassError, Step, first_start, traced};

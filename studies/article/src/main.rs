@@ -7,10 +7,10 @@ use std::time::Instant;
 
 use anyhow::{Context, Result};
 use clap::Parser;
-use host_sim::report::{FigureFormat, write_figures};
-use host_sim::text::{columns, wrapped};
 use indicatif::ProgressBar;
 use muslip_recordings::output::{create_folder, write_file};
+use muslip_report::text::{columns, wrapped};
+use muslip_report::{FigureFormat, write_figures};
 use study_article::{
     CONVERGENCE_PAGE, Paper, PaperOptions, article_markdown, convergence_page, figures,
     report_page, reproduce, work,

@@ -1,7 +1,7 @@
 //! The report, the animation and the page of the documentation.
 
-use host_sim::report::{Block, KeyFigure, Report, Section, Tone};
-use host_sim::text::Table;
+use muslip_report::text::Table;
+use muslip_report::{Block, KeyFigure, Report, Section, Tone};
 
 use super::figures::{Part, convergence, figures};
 use super::pass::PassError;
@@ -142,7 +142,7 @@ pub fn convergence_page(options: PaperOptions) -> Result<Report, PassError> {
                 Block::Convergence(Box::new(run)),
                 Block::Folded {
                     summary: "The frames as a table".into(),
-                    table: host_sim::report::Table::new(head, rows),
+                    table: muslip_report::Table::new(head, rows),
                 },
             ],
         }],
@@ -195,5 +195,5 @@ fn table_block(table: Table) -> Block {
     };
     let rows = table.rows.into_iter();
     let rows = rows.map(|row| row.into_iter().map(unbroken));
-    Block::Table(host_sim::report::Table::new(table.head, rows))
+    Block::Table(muslip_report::Table::new(table.head, rows))
 }

@@ -1,7 +1,7 @@
 //! The tables, for a terminal, for Markdown and for programs.
 
-use host_sim::text::Table;
 use muslip_analysis::estimate::range_word;
+use muslip_report::text::Table;
 use serde_json::{Value, json};
 
 use super::reproduce::{Paper, PaperOptions};

@@ -4,7 +4,7 @@ use std::cell::Cell;
 use std::collections::VecDeque;
 use std::rc::Rc;
 
-use host_sim::simulate::{Contact, Plant, PlantEffect, PlantParameters, PlantState};
+use host_sim::{Contact, Plant, PlantEffect, PlantParameters, PlantState};
 
 use super::scenario::{Actuator, GRAVITY_M_S2, Road, SAMPLE_TIME_S, STEPS_A_SAMPLE, Scenario};
 

@@ -7,10 +7,10 @@ use super::drivers::LockedWheel;
 use super::error::SetupError;
 use super::filtered::Filtered;
 use super::optimum::optimum;
+use super::options::StudyOptions;
 use super::rows::{Ratios, Row};
 use super::run::{Stop, stop};
 use super::scenario::{FaultKind, Road, Scenario, SensorFault};
-use super::study::StudyOptions;
 use super::who::Who;
 
 /// A fault of a sensor of 50 ms from 0.5 s on.

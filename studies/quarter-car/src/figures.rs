@@ -1,6 +1,6 @@
 //! The tutorial's three figures, and what becomes of a wrong mass.
 
-use host_sim::report::{Axis, Extent, Figure, Ink, Shape};
+use muslip_report::{Axis, Extent, Figure, Ink, Shape};
 
 use super::drivers::NOMINAL;
 use super::error::SetupError;

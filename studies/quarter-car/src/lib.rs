@@ -25,6 +25,7 @@ mod figures;
 mod filtered;
 mod observability;
 mod optimum;
+mod options;
 mod pages;
 mod rig_driven;
 mod rows;
@@ -48,6 +49,7 @@ pub use figures::{NamedFigure, figures};
 pub use filtered::Filtered;
 pub use observability::{Listener, Observability, WrongStart, listeners, table as observability};
 pub use optimum::{Optimum, best_constant_slip, bound, optimum};
+pub use options::StudyOptions;
 pub use pages::{markdown, report_page};
 pub use rig_driven::{RigDriven, Setpoint};
 pub use rows::{LOCK_BAR_S, Ratios, Row};
@@ -56,6 +58,6 @@ pub use scenario::{
     Actuator, FOREIGN_RELAXATION_M, FaultKind, GRAVITY_M_S2, Road, SAMPLE_TIME_S, STEPS_A_SAMPLE,
     Scenario, SensorFault, SensorNoise,
 };
-pub use study::{Reference, Study, StudyOptions, draw, study, work};
+pub use study::{Reference, Study, draw, study, work};
 pub use surface::Surface;
 pub use who::{BANK_MASS_STD_KG, Who};

@@ -1,7 +1,7 @@
 //! The report and the page of the documentation.
 
-use host_sim::report::{Block, KeyFigure, Report, Section, Tone};
-use host_sim::text::Table;
+use muslip_report::text::Table;
+use muslip_report::{Block, KeyFigure, Report, Section, Tone};
 
 use super::error::SetupError;
 use super::figures::{WRONG_MASS_KG, figures};
@@ -285,7 +285,7 @@ pub fn report_page(study: &Study) -> Result<Report, SetupError> {
     }
     for (heading, paragraphs, table) in parts(study)? {
         let mut blocks: Vec<Block> = paragraphs.into_iter().map(Block::Paragraph).collect();
-        blocks.push(Block::Table(host_sim::report::Table::new(
+        blocks.push(Block::Table(muslip_report::Table::new(
             table.head, table.rows,
         )));
         sections.push(Section {

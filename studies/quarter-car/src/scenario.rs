@@ -1,6 +1,6 @@
 //! What a stop starts from: vehicle, road, brake, sensors, what goes wrong.
 
-use host_sim::simulate::RigLaw;
+use host_sim::RigLaw;
 use muslip::law::Burckhardt;
 use muslip::law::burckhardt::{DRY_ASPHALT, SNOW, WET_ASPHALT};
 

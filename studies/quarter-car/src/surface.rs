@@ -2,7 +2,7 @@
 
 use std::sync::OnceLock;
 
-use host_sim::simulate::RigLaw;
+use host_sim::RigLaw;
 use muslip::law::burckhardt::{DRY_ASPHALT, PublishedSet, SNOW, WET_ASPHALT};
 use muslip::law::{Burckhardt, MagicFormula, TyreLaw};
 

@@ -1,6 +1,6 @@
 //! The tables, for a terminal, for Markdown and for programs.
 
-use host_sim::text::Table;
+use muslip_report::text::Table;
 use serde_json::{Value, json};
 
 use super::drivers::Channels;

@@ -4,7 +4,7 @@
 
 use std::process::Command;
 
-use host_sim::report::Shape;
+use muslip_report::Shape;
 use study_quarter_car::{
     Banked, Car, Driver, FaultKind, Filtered, PerfectState, RigDriven, Road, Scenario, Setpoint,
     Stop, StudyOptions, WrongStart, draw, fault, figures, listeners, observability, optimum, stop,
@@ -275,7 +275,7 @@ fn rank_of_observability_is_as_the_equations_have_it() {
 #[test]
 fn half_the_plant_s_step_changes_a_stop_by_less_than_a_thousandth() {
     // The same torque, sample by sample, on steps of half the length.
-    use host_sim::simulate::{Plant, PlantParameters, RigLaw};
+    use host_sim::{Plant, PlantParameters, RigLaw};
     let scenario = Scenario::usual(Road::dry(), 43);
     let mut driver = Filtered::tuned(&scenario).unwrap();
     let trace = traced(&scenario, &mut driver, 2.0);

@@ -7,7 +7,7 @@ mod common;
 use std::collections::VecDeque;
 
 use common::{HEADER, Scratch, number};
-use host_sim::simulate::{Brake, BrakeProgramme, Contact, Plant, PlantEffect, PlantParameters};
+use host_sim::{Brake, BrakeProgramme, Contact, Plant, PlantEffect, PlantParameters};
 use muslip_diagnose::campaign::Rig;
 use muslip_diagnose::mechanism::Context;
 use muslip_diagnose::repaired::{NoiseModel, Repaired, RepairedParameter, RepairedTerm};

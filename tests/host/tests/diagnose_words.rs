@@ -5,13 +5,13 @@ mod diagnosis;
 use std::path::Path;
 
 use diagnosis::{assert_valid, consistent, monstrous, partly_explained, with_chain};
-use host_sim::diagnose::summary::{MOST_LINES, WIDEST_LINE, summary};
-use host_sim::diagnose::views::Views;
-use host_sim::diagnose::{files, page};
 use muslip_analysis::diagnose::json;
 use muslip_diagnose::outcome::{BeforeAfter, Diagnosis, Fit, LookedFor, Verdict};
 use muslip_recordings::model_file;
 use muslip_recordings::model_file::ModelFile;
+use muslip_report::diagnose::summary::{MOST_LINES, WIDEST_LINE, summary};
+use muslip_report::diagnose::views::Views;
+use muslip_report::diagnose::{files, page};
 
 fn told(diagnosis: &Diagnosis) -> String {
     told_within(diagnosis, WIDEST_LINE)

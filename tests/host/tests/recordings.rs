@@ -321,7 +321,7 @@ proptest! {
 
 #[test]
 fn bundled_recordings_are_sound() {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../host-sim/demo");
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../crates/muslip-cli/demo");
     let run = Run::read(&folder.join("run.csv"), Required::DragIncluded).unwrap();
     assert!(run.rows() > 1000);
     assert!(fs::metadata(folder.join("run.csv")).unwrap().len() < 300_000);

@@ -5,7 +5,7 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use host_sim::simulate::Scenario;
+use host_sim::Scenario;
 use muslip_diagnose::campaign::Rig;
 use muslip_diagnose::mechanism::{Before, Context, Id};
 use muslip_diagnose::outcome::{
