@@ -8,10 +8,10 @@ use std::process::{Command, Stdio};
 
 use anyhow::{Context, Result, bail};
 
+use super::candidate::{Candidate, Core};
 use super::instruction::{Image, disassembled};
 use super::pipeline;
-use super::{Candidate, Core};
-use crate::step::{command, root};
+use super::process::{command, root};
 
 /// What a candidate costs over the calls of one run.
 #[derive(Debug, Clone, Default)]

@@ -1,9 +1,10 @@
-//! The table and the list that `cargo xtask cycles` prints.
+//! The table and the list that are printed.
 
 use std::fmt::Write;
 
 use super::budget::percent_of_sample;
-use super::{Candidate, Core, Cost};
+use super::candidate::{Candidate, Core};
+use super::trace::Cost;
 
 type Row = (Candidate, Cost);
 
