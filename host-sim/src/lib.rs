@@ -1,7 +1,7 @@
 //! The rig simulator: from a rig file and a brake programme to a recording, for tests, studies and whoever wants to
 //! know what an estimator makes of a truth that it does not share.
 //!
-//! [`Scenario`] is one run: [`Plant`] moves wheel and vehicle, [`Brake`] presses, [`Sensors`] read. [`replay`] puts
+//! [`Scenario`] is one run: [`Plant`] moves wheel and vehicle, [`Brake`] presses, [`Sensors`] read. [`replay()`] puts
 //! recorded inputs under a repaired model; [`Scenario::run_model`] makes a fresh run of one.
 //!
 //! ```

@@ -133,6 +133,7 @@ fn rival() -> Result<PathBuf> {
             "--locked",
             "--quiet",
             "--package",
+            // Which holds the command at that commit.
             "host-sim",
         ])
         .arg("--target-dir")
