@@ -1,7 +1,7 @@
 //! The braked quarter car: plant, slip control loop, its comparison with the best stop there is.
 //!
 //! After P. Goddard's tutorial (docs/quarter-car.md). [`Scenario`] says what a stop starts from, a
-//! [`Driver`] works the brake, [`stop`] runs it, [`optimum`] is what nobody can beat, and [`study`] puts all
+//! [`Driver`] works the brake, [`stop`] runs it, [`optimum()`] is what nobody can beat, and [`study()`] puts all
 //! drivers beside each other on all roads. The same options give the same figures on any number of threads.
 //! `cargo run -p study-quarter-car --release` writes them all.
 //!
