@@ -1,7 +1,7 @@
 //! What a stop starts from: vehicle, road, brake, sensors, what goes wrong.
 
-use muslip::law::Burckhardt;
-use muslip::law::burckhardt::{DRY_ASPHALT, SNOW, WET_ASPHALT};
+use muslip_laws::Burckhardt;
+use muslip_laws::burckhardt::{DRY_ASPHALT, SNOW, WET_ASPHALT};
 
 use super::surface::Surface;
 use crate::simulate::RigLaw;
