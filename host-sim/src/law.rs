@@ -3,8 +3,9 @@
 use std::fmt;
 use std::str::FromStr;
 
-use muslip::law::burckhardt::{PUBLISHED_SETS, published_set};
-use muslip::law::{Burckhardt, LawError, MagicFormula, Peak, Rudd, TyreLaw};
+use muslip::law::{LawError, Peak, Rudd, TyreLaw};
+use muslip_laws::burckhardt::{PUBLISHED_SETS, published_set};
+use muslip_laws::{Burckhardt, MagicFormula};
 
 /// A tyre law that the rig can run on.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -8,8 +8,8 @@
 mod exports;
 
 use muslip::filter::efficient::{self, EfficientFilter};
-use muslip::filter::mu_slip::{Config, Covariance, Decision, Fusion, MuSlipFilter, Range, State};
-use muslip::filter::{Estimator, FrictionMeasurement, PeakEstimate};
+use muslip::filter::mu_slip::{Config, Covariance, Fusion, MuSlipFilter, Range, State};
+use muslip::filter::{Decision, Estimator, FrictionMeasurement, PeakEstimate};
 
 /// What a run starts from.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -10,7 +10,7 @@ use muslip_analysis::fit::Curve;
 /// [`LawError`] where the curve is no tyre's.
 pub fn gradient(curve: Curve, slip_ratio: f64) -> Result<(f64, f64), LawError> {
     let law = Rudd::new(curve.peak_friction, curve.critical_slip)?;
-    let [[by_peak, by_slip]] = law.gradient(slip_ratio).data.0;
+    let [by_peak, by_slip] = law.gradient(slip_ratio);
     Ok((by_peak, by_slip))
 }
 

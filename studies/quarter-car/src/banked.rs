@@ -1,11 +1,11 @@
 //! (f) with wheel speed alone: a bank of road hypotheses.
 
-use muslip::control::lock_guard::{self, LockGuard};
-use muslip::control::slip::{self, SlipController};
-use muslip::filter::quarter_car::{Config, Road as FilterRoad};
-use muslip::filter::road_bank::RoadBank;
 use muslip::law::TyreLaw;
-use muslip::law::burckhardt::{DRY_ASPHALT, SNOW, WET_ASPHALT};
+use muslip_laws::burckhardt::{DRY_ASPHALT, SNOW, WET_ASPHALT};
+use muslip_quarter_car::filter::{Config, Road as FilterRoad};
+use muslip_quarter_car::lock_guard::{self, LockGuard};
+use muslip_quarter_car::road_bank::RoadBank;
+use muslip_quarter_car::slip_control::{self, SlipController};
 
 use super::car::Truth;
 use super::drivers::{NOMINAL, SETPOINT_SHARE, act, controller, rolling_speed};
@@ -40,7 +40,7 @@ impl Banked {
     pub fn new(scenario: &Scenario, mass_std_kg: f64) -> Result<Self, SetupError> {
         let speed = rolling_speed(scenario);
         let sets = [DRY_ASPHALT, WET_ASPHALT, SNOW];
-        let filter = |set: muslip::law::burckhardt::PublishedSet| {
+        let filter = |set: muslip_laws::burckhardt::PublishedSet| {
             let mut config = Config::tuned(NOMINAL, FilterRoad::Known(set.law()), speed);
             config.initial_std.mass_kg = mass_std_kg;
             config.process_std.friction = BANK_FRICTION_STD;
@@ -79,7 +79,7 @@ impl Banked {
             &mut self.guard,
             &mut self.controller,
             readings,
-            &slip::Input {
+            &slip_control::Input {
                 slip_ratio: self.bank.slip_ratio(),
                 vehicle_speed_m_s: self.bank.estimate().state.vehicle_speed_m_s,
                 tyre_torque_nm: self.bank.tyre_torque_nm(),

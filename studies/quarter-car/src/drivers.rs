@@ -1,8 +1,10 @@
 //! Who drives the brake in the rows of the comparison, and what they share.
 
-use muslip::control::lock_guard::{Advice, LockGuard};
-use muslip::control::slip::{self, SlipController};
-use muslip::filter::quarter_car::{Channel, Measurement, QuarterCarFilter, StepError, Vehicle};
+use muslip_quarter_car::filter::{
+    Channel, Filter as QuarterCarFilter, Measurement, StepError, Vehicle,
+};
+use muslip_quarter_car::lock_guard::{Advice, LockGuard};
+use muslip_quarter_car::slip_control::{self, SlipController};
 
 use super::car::Truth;
 use super::run::{Belief, Driver, Readings};
@@ -20,8 +22,8 @@ pub const NOMINAL: Vehicle<f64> = Vehicle {
 pub const SETPOINT_SHARE: f64 = 0.9;
 
 /// The controller of all rows, for a setpoint and a scenario's brake.
-pub fn controller(scenario: &Scenario, setpoint_slip: f64) -> slip::Config<f64> {
-    slip::Config {
+pub fn controller(scenario: &Scenario, setpoint_slip: f64) -> slip_control::Config<f64> {
+    slip_control::Config {
         setpoint_slip,
         bandwidth_rad_s: 40.0,
         integral_time_s: 0.25,
@@ -65,8 +67,8 @@ impl PerfectState {
     /// For a scenario; the setpoint is the share of the peak's slip under the wheel.
     ///
     /// # Errors
-    /// [`slip::ControlError`] if a part refuses its configuration or step.
-    pub fn new(scenario: &Scenario) -> Result<Self, slip::ControlError> {
+    /// [`slip_control::ControlError`] if a part refuses its configuration or step.
+    pub fn new(scenario: &Scenario) -> Result<Self, slip_control::ControlError> {
         let (_, peak_slip) = scenario.road.peak_at(0.0);
         Ok(Self {
             controller: controller(scenario, SETPOINT_SHARE * peak_slip).build()?,
@@ -88,7 +90,7 @@ impl Driver for PerfectState {
             .controller
             .set_setpoint_slip(SETPOINT_SHARE * peak_slip)
             .and_then(|()| {
-                self.controller.step(&slip::Input {
+                self.controller.step(&slip_control::Input {
                     slip_ratio: (truth.vehicle_speed_m_s > 0.5).then_some(truth.slip_ratio),
                     vehicle_speed_m_s: truth.vehicle_speed_m_s,
                     tyre_torque_nm: self.vehicle.radius_m
@@ -131,8 +133,8 @@ pub(super) fn correct_with_wheel(
 }
 
 /// What a controller is told of a filter's estimate.
-pub(super) fn slip_input(filter: &QuarterCarFilter<f64>) -> slip::Input<f64> {
-    slip::Input {
+pub(super) fn slip_input(filter: &QuarterCarFilter<f64>) -> slip_control::Input<f64> {
+    slip_control::Input {
         slip_ratio: filter.slip_ratio(),
         vehicle_speed_m_s: filter.estimate().state.vehicle_speed_m_s,
         tyre_torque_nm: filter.tyre_torque_nm(),
@@ -179,8 +181,8 @@ pub(super) fn act(
     guard: &mut Option<LockGuard<f64>>,
     controller: &mut SlipController<f64>,
     readings: &Readings,
-    input: &slip::Input<f64>,
-) -> Result<(), slip::ControlError> {
+    input: &slip_control::Input<f64>,
+) -> Result<(), slip_control::ControlError> {
     let advice = guard
         .as_mut()
         .map_or(Advice::Free, |guard| guard.step(readings.wheel_speed_rad_s));

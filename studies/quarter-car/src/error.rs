@@ -5,17 +5,17 @@
 pub enum SetupError {
     /// The filter's configuration.
     #[error(transparent)]
-    Filter(#[from] muslip::filter::quarter_car::ConfigError),
+    Filter(#[from] muslip_quarter_car::filter::ConfigError),
     /// A step of the filter.
     #[error(transparent)]
-    Step(#[from] muslip::filter::quarter_car::StepError),
+    Step(#[from] muslip_quarter_car::filter::StepError),
     /// The setpoint's two-state filter.
     #[error(transparent)]
     Peak(#[from] muslip::filter::mu_slip::UpdateError),
     /// The seeker of the setpoint.
     #[error(transparent)]
-    Seeker(#[from] muslip::control::peak_seeker::ConfigError),
+    Seeker(#[from] muslip_quarter_car::peak_seeker::ConfigError),
     /// The controller.
     #[error(transparent)]
-    Control(#[from] muslip::control::slip::ControlError),
+    Control(#[from] muslip_quarter_car::slip_control::ControlError),
 }

@@ -1,6 +1,6 @@
 //! What a user meets on the first day, and a filter that believes in another road.
 
-use muslip::law::burckhardt::WET_ASPHALT;
+use muslip_laws::burckhardt::WET_ASPHALT;
 use rayon::prelude::*;
 
 use super::drivers::LockedWheel;
@@ -25,7 +25,7 @@ pub fn fault(kind: FaultKind) -> SensorFault {
 /// The tuned filter on a dry road with what a user meets on the first day.
 pub(super) fn faults(options: StudyOptions) -> Result<Vec<Row>, SetupError> {
     type Change = fn(&mut Scenario);
-    type Start = fn(&mut muslip::filter::quarter_car::Config<f64>);
+    type Start = fn(&mut muslip_quarter_car::filter::Config<f64>);
     let cases: [(&str, Change, Start); 8] = [
         ("nothing wrong", |_| {}, |_| {}),
         (

@@ -1,9 +1,10 @@
 //! (b) and (c): the controller on a filter that is told the road.
 
-use muslip::control::lock_guard::{self, LockGuard};
-use muslip::control::slip::{self, SlipController};
-use muslip::filter::quarter_car::{Config, QuarterCarFilter, Road as FilterRoad};
-use muslip::law::{Burckhardt, TyreLaw};
+use muslip::law::TyreLaw;
+use muslip_laws::Burckhardt;
+use muslip_quarter_car::filter::{Config, Filter as QuarterCarFilter, Road as FilterRoad};
+use muslip_quarter_car::lock_guard::{self, LockGuard};
+use muslip_quarter_car::slip_control::{self, SlipController};
 
 use super::car::Truth;
 use super::drivers::{
@@ -34,13 +35,13 @@ impl Filtered {
     /// The controller on a filter. `wheel_variance` in rad²/s² is what the filter is told.
     ///
     /// # Errors
-    /// [`slip::ControlError`] if a part refuses its configuration or step.
+    /// [`slip_control::ControlError`] if a part refuses its configuration or step.
     pub fn new(
         scenario: &Scenario,
         filter: QuarterCarFilter<f64>,
         channels: Channels,
         wheel_variance: f64,
-    ) -> Result<Self, slip::ControlError> {
+    ) -> Result<Self, slip_control::ControlError> {
         let peak_slip = scenario.road.law_at(0.0).peak().slip_ratio;
         Ok(Self {
             filter,

@@ -1,9 +1,9 @@
 //! What the readings can tell: rank of the linearised system, and filters that merely listen.
 
-use muslip::filter::quarter_car::{
-    Channel, Config, Measurement, QuarterCarFilter, Road as FilterRoad, State, StateStd,
-};
 use muslip::law::TyreLaw;
+use muslip_quarter_car::filter::{
+    Channel, Config, Filter as QuarterCarFilter, Measurement, Road as FilterRoad, State, StateStd,
+};
 use nalgebra::{DMatrix, SMatrix, SVector};
 
 use super::car::Truth;
@@ -86,7 +86,8 @@ fn at(
         mass_kg: mass,
     };
     let torque = NOMINAL.radius_m * GRAVITY_M_S2 * friction * mass;
-    let f = filter.transition_jacobian(&state, torque);
+    // nalgebra takes an array by its columns.
+    let f = SMatrix::<f64, 5, 5>::from(filter.transition_jacobian(&state, torque)).transpose();
     let scale = SMatrix::<f64, 5, 5>::from_diagonal(&SVector::from(TYPICAL));
     let mut heads = vec![[1.0, 0.0, 0.0, 0.0, 0.0]];
     if channels == Channels::Rig {

@@ -1,11 +1,11 @@
 //! (f) with the rig's four channels: the peak is found while braking.
 
-use muslip::control::lock_guard::{self, LockGuard};
-use muslip::control::peak_seeker::{self, PeakSeeker};
-use muslip::control::slip::SlipController;
 use muslip::filter::FrictionMeasurement;
-use muslip::filter::quarter_car::{Config, QuarterCarFilter, Road as FilterRoad};
 use muslip::sample::{RigSample, SampleLimits, slip_friction};
+use muslip_quarter_car::filter::{Config, Filter as QuarterCarFilter, Road as FilterRoad};
+use muslip_quarter_car::lock_guard::{self, LockGuard};
+use muslip_quarter_car::peak_seeker::{self, PeakSeeker};
+use muslip_quarter_car::slip_control::SlipController;
 
 use super::car::Truth;
 use super::drivers::{

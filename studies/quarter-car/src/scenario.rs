@@ -1,8 +1,8 @@
 //! What a stop starts from: vehicle, road, brake, sensors, what goes wrong.
 
 use host_sim::RigLaw;
-use muslip::law::Burckhardt;
-use muslip::law::burckhardt::{DRY_ASPHALT, SNOW, WET_ASPHALT};
+use muslip_laws::Burckhardt;
+use muslip_laws::burckhardt::{DRY_ASPHALT, SNOW, WET_ASPHALT};
 
 use super::surface::Surface;
 

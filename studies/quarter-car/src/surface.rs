@@ -3,8 +3,9 @@
 use std::sync::OnceLock;
 
 use host_sim::RigLaw;
-use muslip::law::burckhardt::{DRY_ASPHALT, PublishedSet, SNOW, WET_ASPHALT};
-use muslip::law::{Burckhardt, MagicFormula, TyreLaw};
+use muslip::law::TyreLaw;
+use muslip_laws::burckhardt::{DRY_ASPHALT, PublishedSet, SNOW, WET_ASPHALT};
+use muslip_laws::{Burckhardt, MagicFormula};
 
 use super::search::compass_search;
 

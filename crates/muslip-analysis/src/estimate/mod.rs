@@ -8,14 +8,12 @@ mod trace;
 
 use std::io::{self, Write};
 
-use muslip::compensate::{Compensated, NoMeasurement};
 use muslip::filter::efficient::{self, EfficientFilter};
-use muslip::filter::mu_slip::{
-    Config, ConfigError, Decision, Estimate, Fusion, MuSlipFilter, Range, State,
-};
-use muslip::filter::{Estimator, FrictionMeasurement, PeakEstimate};
-use muslip::law::rudd::Expansion;
+use muslip::filter::mu_slip::{Config, ConfigError, Estimate, Fusion, MuSlipFilter, Range, State};
+use muslip::filter::{Decision, Estimator, FrictionMeasurement, PeakEstimate};
+use muslip::law::Expansion;
 use muslip::sample::slip_friction;
+use muslip_compensate::{Compensated, NoMeasurement};
 use muslip_diagnose::repaired::Repaired;
 use muslip_recordings::input_error::{InputError, InputProblem};
 use muslip_recordings::recording::{Recording, Row};
@@ -292,7 +290,7 @@ impl Front {
                 }
             }
             // The compensator is what it was: the row's time belongs to the next one.
-            Err(muslip::compensate::StepError::NonFinite { .. }) => self.skipped.not_finite += 1,
+            Err(muslip_compensate::StepError::NonFinite { .. }) => self.skipped.not_finite += 1,
             Err(_) => self.skipped.refused += 1,
         }
         None

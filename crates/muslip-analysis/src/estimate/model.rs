@@ -1,11 +1,11 @@
 //! What of a repaired model the estimate can compensate sample by sample, and what it cannot.
 
-use muslip::compensate::{
+use muslip::filter::mu_slip::State;
+use muslip::sample::RigSample;
+use muslip_compensate::{
     Compensated, Compensation, Compensator, EffectiveRadius, ForceDelay, ForceLag, LoadCrosstalk,
     LoadSensitivity, Relaxation, SpeedSensitivity, StepError, ThermalFade, ZeroDrift,
 };
-use muslip::filter::mu_slip::State;
-use muslip::sample::RigSample;
 use muslip_diagnose::mechanism::{self, Context, Id};
 use muslip_diagnose::repaired::{Repaired, RepairedTerm};
 use serde_json::json;
