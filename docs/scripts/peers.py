@@ -2,7 +2,7 @@
 """scipy's curve_fit and filterpy's Kalman filters on the streams of the estimators' comparison.
 
     python3 -m venv venv && venv/bin/pip install numpy scipy filterpy
-    cargo run --release -p host-sim --example estimators -- 1000 --export streams.jsonl
+    cargo run -p study-estimators --release -- 1000 --export streams.jsonl
     venv/bin/python docs/scripts/peers.py accuracy streams.jsonl
     venv/bin/python docs/scripts/peers.py rate [RUNS]
 
@@ -192,7 +192,7 @@ def main():
     parser = argparse.ArgumentParser(description="scipy and filterpy beside our estimators")
     commands = parser.add_subparsers(required=True, dest="command")
     accuracy_parser = commands.add_parser("accuracy", help="errors on the same streams")
-    accuracy_parser.add_argument("file", help="what `--example estimators -- STREAMS --export FILE` wrote")
+    accuracy_parser.add_argument("file", help="what `study-estimators STREAMS --export FILE` wrote")
     rate_parser = commands.add_parser("rate", help="filter runs a second")
     rate_parser.add_argument("runs", nargs="?", type=int, default=1_000_000, help="runs of each of our filters")
     arguments = parser.parse_args()

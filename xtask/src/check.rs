@@ -20,11 +20,17 @@ pub fn run_all() -> Result<()> {
         ]),
     )?;
     run(
-        "clippy of the core's features",
+        "clippy of the features",
         cargo(&[
             "clippy",
             "--package",
             "muslip",
+            "--package",
+            "muslip-laws",
+            "--package",
+            "muslip-quarter-car",
+            "--package",
+            "muslip-compensate",
             "--all-features",
             "--locked",
             "--",

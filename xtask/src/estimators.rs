@@ -18,14 +18,14 @@ const STREAMS: &str = "target/streams.jsonl";
 
 /// Prints the tables; `write` puts them into their document, `python` adds scipy and filterpy.
 pub fn run_all(streams: u64, write: bool, python: Option<&str>) -> Result<()> {
-    let accuracy = output(example(&[&streams.to_string()]))?;
+    let accuracy = output(study(&[&streams.to_string()]))?;
     table("accuracy", &accuracy, write)?;
     let Some(python) = python else {
         return Ok(());
     };
     run(
         "streams for the peers",
-        example(&[
+        study(&[
             &streams.min(MOST_FOR_SCIPY).to_string(),
             "--export",
             STREAMS,
@@ -40,16 +40,14 @@ pub fn run_all(streams: u64, write: bool, python: Option<&str>) -> Result<()> {
     Ok(())
 }
 
-fn example(arguments: &[&str]) -> Command {
+fn study(arguments: &[&str]) -> Command {
     let mut command = cargo(&[
         "run",
         "--release",
         "--locked",
         "--quiet",
         "--package",
-        "host-sim",
-        "--example",
-        "estimators",
+        "study-estimators",
         "--",
     ]);
     command.args(arguments);

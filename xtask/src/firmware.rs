@@ -17,7 +17,7 @@ const TARGET: &str = "thumbv7em-none-eabihf";
 /// Profile of the image.
 const PROFILE: &str = "firmware";
 /// Core cycles from one sample to the next.
-pub const CYCLES_PER_SAMPLE: u64 = 168_000;
+const CYCLES_PER_SAMPLE: u64 = 168_000;
 /// Simulated seconds of the endurance run in `cargo xtask test`; ten minutes is `cargo xtask pil --seconds 600`.
 const SECONDS_IN_TEST: &str = "5";
 /// Images with what must not be in one.

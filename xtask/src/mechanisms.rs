@@ -19,7 +19,7 @@ pub fn write() -> Result<()> {
         "--locked",
         "--quiet",
         "--package",
-        "host-sim",
+        "muslip-cli",
         "--bin",
         "muslip",
         "--",

@@ -12,10 +12,19 @@ use crate::step::{cargo, run, step};
 use crate::trial;
 
 /// Packages whose `#[ignore]`d tests are long rather than broken: run in release.
-const LONG_TESTS: &[&str] = &["muslip", "host-tests"];
+const LONG_TESTS: &[&str] = &["muslip", "host-tests", "study-quarter-car"];
 
-/// Feature sets of the core; neither may change whether it builds.
-const CORE_FEATURES: [&str; 4] = ["", "defmt", "serde", "defmt,serde"];
+/// The libraries of the target, with the sets of features that each must build with.
+const TARGET_LIBRARIES: [(&str, &[&str]); 5] = [
+    (
+        "muslip",
+        &["", "defmt", "serde", "nalgebra", "defmt,serde,nalgebra"],
+    ),
+    ("muslip-laws", &["", "defmt", "serde", "defmt,serde"]),
+    ("muslip-quarter-car", &["", "defmt", "serde", "defmt,serde"]),
+    ("muslip-compensate", &["", "defmt", "serde", "defmt,serde"]),
+    ("muslip-innovations", &[""]),
+];
 
 /// Sums of the test harness's result lines.
 #[derive(Debug, Default, Clone, Copy, PartialEq, Eq)]
@@ -45,13 +54,16 @@ pub fn run_all() -> Result<()> {
 
     // These exist only with the feature on.
     let features = tests(
-        "tests of the core's serialisation",
+        "tests of the features serde and nalgebra",
         cargo(&[
             "test",
             "--package",
             "muslip",
+            "--package",
+            "muslip-laws",
             "--features",
-            "serde",
+            "muslip/serde,muslip/nalgebra,muslip-laws/serde",
+            "--lib",
             "--test",
             "serialised",
             "--locked",
@@ -62,43 +74,30 @@ pub fn run_all() -> Result<()> {
     trial::small()?;
 
     for target in TARGETS {
-        for features in CORE_FEATURES {
-            let name = if features.is_empty() {
-                "none"
-            } else {
-                features
-            };
-            run(
-                &format!("core for {target}, features: {name}"),
-                cargo(&[
-                    "build",
-                    "--package",
-                    "muslip",
-                    "--lib",
-                    "--locked",
-                    "--quiet",
-                    "--target",
-                    target,
-                    "--features",
-                    features,
-                ]),
-            )?;
+        for (package, sets) in TARGET_LIBRARIES {
+            for features in sets {
+                let name = if features.is_empty() {
+                    "none"
+                } else {
+                    features
+                };
+                run(
+                    &format!("{package} for {target}, features: {name}"),
+                    cargo(&[
+                        "build",
+                        "--package",
+                        package,
+                        "--lib",
+                        "--locked",
+                        "--quiet",
+                        "--target",
+                        target,
+                        "--features",
+                        features,
+                    ]),
+                )?;
+            }
         }
-    }
-
-    for target in TARGETS {
-        run(
-            &format!("live innovations for {target}"),
-            cargo(&[
-                "build",
-                "--package",
-                "muslip-innovations",
-                "--locked",
-                "--quiet",
-                "--target",
-                target,
-            ]),
-        )?;
     }
 
     cycles::check()?;

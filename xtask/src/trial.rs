@@ -49,7 +49,7 @@ pub fn play(arguments: &[String]) -> Result<()> {
             "--locked",
             "--quiet",
             "--package",
-            "host-sim",
+            "muslip-cli",
             "--package",
             "sealed-trial",
         ]),
@@ -133,6 +133,7 @@ fn rival() -> Result<PathBuf> {
             "--locked",
             "--quiet",
             "--package",
+            // Which holds the command at that commit.
             "host-sim",
         ])
         .arg("--target-dir")

@@ -4,11 +4,9 @@
 //! the measured vehicle speed overrules the model's deceleration. Its slip is what is held, and the tyre's torque
 //! as estimated is fed forward.
 
-use muslip::control::slip;
-use muslip::filter::quarter_car::{
-    self, Channel, Measurement, QuarterCarFilter, Road, StateStd, Vehicle,
-};
 use muslip::sample::RigSample;
+use muslip_quarter_car::filter::{self, Channel, Filter, Measurement, Road, StateStd, Vehicle};
+use muslip_quarter_car::slip_control::{self, SlipController};
 use muslip_record::{Parameters, QuarterCar};
 
 use crate::SAMPLE_S;
@@ -31,8 +29,8 @@ pub struct Refused;
 /// Filter and controller of one application.
 #[derive(Debug, Clone, Copy)]
 pub struct SlipHold {
-    filter: QuarterCarFilter<f32>,
-    controller: slip::SlipController<f32>,
+    filter: Filter<f32>,
+    controller: SlipController<f32>,
     torque_at_full_nm: f32,
     friction_std: f32,
 }
@@ -54,8 +52,8 @@ impl SlipHold {
             inertia_kg_m2: wheel.inertia_kg_m2,
             gravity_m_s2: GRAVITY_M_S2,
         };
-        let tuned = quarter_car::Config::tuned(vehicle, Road::Unknown, sample.vehicle_speed_m_s);
-        let filter = quarter_car::Config {
+        let tuned = filter::Config::tuned(vehicle, Road::Unknown, sample.vehicle_speed_m_s);
+        let filter = filter::Config {
             sample_time_s: SAMPLE_S,
             initial_mass_kg: sample.normal_force_n / GRAVITY_M_S2,
             process_std: StateStd {
@@ -69,7 +67,7 @@ impl SlipHold {
             refuses_repeats: false,
             ..tuned
         };
-        let controller = slip::Config {
+        let controller = slip_control::Config {
             setpoint_slip: target_slip,
             bandwidth_rad_s: control.bandwidth_rad_s,
             integral_time_s: control.integral_time_s,
@@ -122,7 +120,7 @@ impl SlipHold {
             };
             self.filter.update(&measurement).map_err(|_| Refused)?;
         }
-        let input = slip::Input {
+        let input = slip_control::Input {
             slip_ratio: self.filter.slip_ratio(),
             vehicle_speed_m_s: self.filter.estimate().state.vehicle_speed_m_s,
             tyre_torque_nm: self.filter.tyre_torque_nm(),

@@ -11,7 +11,7 @@ use crate::correction::{Action, Levers, hat};
 use crate::data::{Catalogue, Data};
 use crate::mechanism::{Context, Parameter};
 use crate::model::{Model, Term, tyre};
-use crate::noise::Likelihood;
+pub use crate::noise::Likelihood;
 use crate::prepare::prepare;
 use crate::series::Series;
 use crate::variable::Variable;

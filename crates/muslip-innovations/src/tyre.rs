@@ -24,7 +24,7 @@ struct Expansion<T> {
 /// ∂mu/∂s = 2 mup/sp (1 − x²) w²     ∂²mu/∂s² = 2 mup/sp² 2x (x² − 3) w³
 /// ```
 fn expand<T: Real>(law: &Rudd<T>, slip_ratio: T, normal_force_n: T) -> Expansion<T> {
-    let [peak_friction, critical_slip] = law.parameters().into();
+    let [peak_friction, critical_slip] = law.parameters();
     let per_slip = T::ONE / critical_slip;
     let x = slip_ratio * per_slip;
     let x2 = x * x;

@@ -97,9 +97,9 @@
     )
 )]
 
-pub mod compensate;
-pub mod control;
 pub mod filter;
 pub mod law;
+#[cfg(feature = "nalgebra")]
+mod matrix;
 pub mod real;
 pub mod sample;

@@ -6,8 +6,8 @@
 )]
 
 use muslip::filter::efficient::{Config, ConfigError, ConfigParameter, EfficientFilter};
-use muslip::filter::mu_slip::{Decision, Range, UpdateError};
-use muslip::filter::{Estimator, FrictionMeasurement};
+use muslip::filter::mu_slip::{Range, UpdateError};
+use muslip::filter::{Decision, Estimator, FrictionMeasurement};
 use test_support::noise::Noise;
 
 const SIGMA: f64 = 0.04;

@@ -315,7 +315,8 @@ fn a_whole_run_agrees_with_full_matrices() {
     for seed in 0..200 {
         let mut filter = Config::<f64>::default().build().unwrap();
         let start = filter.estimate();
-        let (mut x, mut p) = (start.state.to_vector(), start.covariance.to_matrix());
+        let mut x = Vector2::from(start.state.to_array());
+        let mut p = Matrix2::from(start.covariance.rows());
         for (slip_ratio, friction) in test_support::scenario::article::measurements(seed) {
             let friction_std = test_support::scenario::article::FRICTION_STD;
             let measurement = FrictionMeasurement {

@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 use common::{HEADER, RIG, Scratch, recording_of};
 use test_support::scenario::article;
 
-const SUBCOMMANDS: [&str; 11] = [
+const SUBCOMMANDS: [&str; 9] = [
     "rig",
     "estimate",
     "campaign",
@@ -16,8 +16,6 @@ const SUBCOMMANDS: [&str; 11] = [
     "diagnose",
     "predict",
     "simulate",
-    "paper",
-    "quarter-car",
     "demo",
     "completions",
 ];
@@ -372,9 +370,7 @@ fn a_page_of_five_thousand_samples_stays_below_two_megabytes() {
 fn no_line_is_longer_than_the_terminal_has_columns() {
     let scratch = scratch();
     scratch.write("other.csv", recording_of(article::measurements(2)));
-    let commands: [&[&str]; 5] = [
-        &["paper", "--seeds", "2"],
-        &["quarter-car", "--stops", "1", "--draws", "1"],
+    let commands: [&[&str]; 3] = [
         &["estimate", "--rig", "rig.toml", "run.csv"],
         &["fit", "--rig", "rig.toml", "run.csv"],
         &[

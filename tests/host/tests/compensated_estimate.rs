@@ -7,11 +7,11 @@ mod common;
 use std::collections::VecDeque;
 
 use common::{HEADER, Scratch, number};
-use host_sim::diagnose::model_file::to_text;
-use host_sim::simulate::{Brake, BrakeProgramme, Contact, Plant, PlantEffect, PlantParameters};
+use host_sim::{Brake, BrakeProgramme, Contact, Plant, PlantEffect, PlantParameters};
 use muslip_diagnose::campaign::Rig;
 use muslip_diagnose::mechanism::Context;
 use muslip_diagnose::repaired::{NoiseModel, Repaired, RepairedParameter, RepairedTerm};
+use muslip_recordings::model_file::to_text;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};

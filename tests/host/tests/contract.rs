@@ -4,7 +4,7 @@
 mod diagnosis;
 
 use diagnosis::{assert_valid, contract, partly_explained, shared_contract, with_chain};
-use host_sim::diagnose::json::{make_finite, to_text};
+use muslip_analysis::diagnose::json::{make_finite, to_text};
 use muslip_diagnose::mechanism::Id;
 use serde_json::Value;
 

@@ -7,9 +7,9 @@ use std::path::Path;
 
 use common::Scratch;
 use diagnosis::{HEADER, RIG, campaign, repaired};
-use host_sim::diagnose::model_file::{ModelFile, to_text};
 use muslip_diagnose::campaign::Run;
 use muslip_diagnose::repaired::Which;
+use muslip_recordings::model_file::{ModelFile, to_text};
 use proptest::prelude::*;
 
 const PREDICT: [&str; 8] = [

@@ -5,11 +5,13 @@ mod diagnosis;
 use std::path::Path;
 
 use diagnosis::{assert_valid, consistent, monstrous, partly_explained, with_chain};
-use host_sim::diagnose::model_file::ModelFile;
-use host_sim::diagnose::summary::{MOST_LINES, WIDEST_LINE, summary};
-use host_sim::diagnose::views::Views;
-use host_sim::diagnose::{job, json, model_file, page};
+use muslip_analysis::diagnose::json;
 use muslip_diagnose::outcome::{BeforeAfter, Diagnosis, Fit, LookedFor, Verdict};
+use muslip_recordings::model_file;
+use muslip_recordings::model_file::ModelFile;
+use muslip_report::diagnose::summary::{MOST_LINES, WIDEST_LINE, summary};
+use muslip_report::diagnose::views::Views;
+use muslip_report::diagnose::{files, page};
 
 fn told(diagnosis: &Diagnosis) -> String {
     told_within(diagnosis, WIDEST_LINE)
@@ -209,19 +211,19 @@ fn a_column_named_like_markup_is_text_in_the_report() {
 fn a_failure_to_write_leaves_what_was_there() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("found");
-    job::write(&out, &consistent(), &Views::default(), "first").unwrap();
+    files::write(&out, &consistent(), &Views::default(), "first").unwrap();
     let before = read_all(&out);
     assert_eq!(
         before
             .iter()
             .map(|(name, _)| name.as_str())
             .collect::<Vec<_>>(),
-        job::FILES
+        files::FILES
     );
     // The last of the three cannot be made: a folder has its name.
     std::fs::remove_file(out.join("report.html")).unwrap();
     std::fs::create_dir(out.join("report.html")).unwrap();
-    let error = job::write(&out, &partly_explained(), &Views::default(), "second").unwrap_err();
+    let error = files::write(&out, &partly_explained(), &Views::default(), "second").unwrap_err();
     assert!(
         error
             .to_string()

@@ -8,12 +8,12 @@ use std::path::PathBuf;
 
 use common::Scratch;
 use diagnosis::{RIG, parameter, partly_explained, repaired};
-use host_sim::diagnose::effects::effects;
-use host_sim::diagnose::load;
-use host_sim::diagnose::model_file::to_text;
 use muslip_diagnose::campaign::Run;
 use muslip_diagnose::outcome::Diagnosis;
 use muslip_diagnose::repaired::{Repaired, RepairedTerm};
+use muslip_recordings::load;
+use muslip_recordings::model_file::to_text;
+use muslip_report::diagnose::effects::effects;
 
 /// A mechanism: its id, its form, and name, value and unit of each parameter.
 type Case = (

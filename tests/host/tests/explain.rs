@@ -5,8 +5,8 @@ mod common;
 use std::path::Path;
 
 use common::Scratch;
-use host_sim::diagnose::guide::{markdown, pictures};
 use muslip_diagnose::mechanism::Id;
+use muslip_report::guide::{markdown, pictures};
 
 fn docs() -> std::path::PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs")
@@ -30,7 +30,7 @@ fn every_mechanism_has_a_picture_that_shows_it() {
     for (id, figure) in pictures {
         let file = docs().join(format!("mechanisms/{}.svg", id.as_str()));
         assert!(file.exists(), "{}: cargo xtask mechanisms", file.display());
-        let drawn = host_sim::report::FigureFormat::Svg.bytes_of(&figure);
+        let drawn = muslip_report::FigureFormat::Svg.bytes_of(&figure);
         assert!(drawn.unwrap().len() > 2000, "{}", id.as_str());
     }
 }

@@ -3,7 +3,7 @@
 mod common;
 
 use common::{HEADER, RIG, Scratch, measured_data, number, recording_of};
-use host_sim::fit::{Curve, fit_curve, robust_start};
+use muslip_analysis::fit::{Curve, fit_curve, robust_start};
 use serde_json::Value;
 use test_support::scenario::article;
 

@@ -72,28 +72,34 @@ fn pages_of_the_demo_are_drawn_without_network_or_fault() {
     }
 }
 
+fn convergence_page(options: study_article::PaperOptions) -> String {
+    let page = study_article::convergence_page(options).unwrap();
+    page.to_html().unwrap()
+}
+
 #[test]
 fn pages_of_the_article_and_the_quarter_car_are_drawn_without_network_or_fault() {
     let Some(mut browser) = Browser::start() else {
         return;
     };
     let scratch = Scratch::new();
-    scratch.output(&["paper", "--seeds", "20", "--out", "paper"]);
-    scratch.output(&[
-        "quarter-car",
-        "--stops",
-        "1",
-        "--draws",
-        "1",
-        "--out",
-        "car",
-    ]);
+    let options = study_article::PaperOptions {
+        seed: 1,
+        streams: 20,
+    };
+    let article = study_article::report_page(&study_article::reproduce(options, &mut |_| {}));
+    scratch.write("article.html", article.unwrap().to_html().unwrap());
+    scratch.write("convergence.html", convergence_page(options));
+    let options = study_quarter_car::StudyOptions {
+        stops: 1,
+        draws: 1,
+        ..Default::default()
+    };
+    let car = study_quarter_car::study(options, &mut |_| {}).unwrap();
+    let car = study_quarter_car::report_page(&car).unwrap();
+    scratch.write("car.html", car.to_html().unwrap());
     for view in [WIDE, NARROW] {
-        for page in [
-            "paper/report.html",
-            "paper/convergence.html",
-            "car/report.html",
-        ] {
+        for page in ["article.html", "convergence.html", "car.html"] {
             check(&mut browser, &scratch, page, view);
         }
     }
@@ -338,12 +344,16 @@ fn a_page_looks_as_it_did() {
         return;
     };
     let scratch = Scratch::new();
-    scratch.output(&["paper", "--seeds", "2", "--out", "paper"]);
+    let options = study_article::PaperOptions {
+        seed: 1,
+        streams: 2,
+    };
+    scratch.write("convergence.html", convergence_page(options));
     for (view, name) in [
         (WIDE, "convergence-wide"),
         (NARROW, "convergence-narrow-dark"),
     ] {
-        browser.open(&scratch.path("paper/convergence.html"), view);
+        browser.open(&scratch.path("convergence.html"), view);
         let picture = browser.picture(Some(1100.0), 0.25);
         let path = format!("{}/tests/pictures/{name}.png", env!("CARGO_MANIFEST_DIR"));
         if std::env::var_os("MUSLIP_BLESS").is_some() {

@@ -7,7 +7,7 @@ use std::io::Write;
 use std::path::Path;
 
 use common::{HEADER, RIG, Scratch};
-use host_sim::recording::{Channel, Recording, Required, Run};
+use muslip_recordings::recording::{Channel, Recording, Required, Run};
 use proptest::prelude::*;
 
 fn read(contents: &[u8], required: Required) -> Result<Run, String> {
@@ -306,7 +306,7 @@ proptest! {
     ) {
         let names = HEADER.split(',').collect::<Vec<_>>();
         let mut writer =
-            host_sim::recording::RecordingWriter::new(Vec::new(), &["origin".into()], &names).unwrap();
+            muslip_recordings::recording::RecordingWriter::new(Vec::new(), &["origin".into()], &names).unwrap();
         for (index, row) in values.iter().enumerate() {
             writer.row(&[&[index as f64][..], row].concat()).unwrap();
         }
@@ -321,7 +321,7 @@ proptest! {
 
 #[test]
 fn bundled_recordings_are_sound() {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../host-sim/demo");
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../crates/muslip-cli/demo");
     let run = Run::read(&folder.join("run.csv"), Required::DragIncluded).unwrap();
     assert!(run.rows() > 1000);
     assert!(fs::metadata(folder.join("run.csv")).unwrap().len() < 300_000);

@@ -3,7 +3,7 @@
 mod common;
 
 use common::{RIG, Scratch, number};
-use host_sim::recording::{Channel, Required, Run};
+use muslip_recordings::recording::{Channel, Required, Run};
 
 fn simulate(scratch: &Scratch, out: &str, more: &[&str]) -> Run {
     let arguments = [&["simulate", "--rig", "rig.toml", "--out", out][..], more].concat();

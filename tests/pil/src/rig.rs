@@ -1,7 +1,7 @@
 //! The rig simulator behind the sensors' counts and codes, and in front of the valves.
 
 use anyhow::{Result, anyhow};
-use host_sim::simulate::{Plant, PlantParameters, RigLaw};
+use host_sim::{Plant, PlantParameters, RigLaw};
 use muslip_control::EDGE_TIMER_HZ;
 use muslip_control::board::{BridgeQuality, BridgeReading, EncoderReading, RawSample};
 use muslip_control::brake::BrakeOutput;

@@ -1,9 +1,9 @@
 //! One step of the quarter car's filter: a prediction and a correction with the wheel's speed.
 
-use muslip::filter::quarter_car::{Channel, Config, Measurement, QuarterCarFilter, Road, Vehicle};
-use muslip::law::burckhardt::DRY_ASPHALT;
+use muslip_laws::burckhardt::DRY_ASPHALT;
+use muslip_quarter_car::filter::{Channel, Config, Filter, Measurement, Road, Vehicle};
 
-pub type Memory = QuarterCarFilter<f32>;
+pub type Memory = Filter<f32>;
 
 pub fn start() -> Memory {
     let vehicle = Vehicle {

@@ -1,14 +1,11 @@
 //! Recursive estimators of the mu-slip curve.
 //!
-//! Every filter has a module of its own with its state, covariance, configuration and errors, and
-//! implements [`Estimator`]: code that only wants the curve's peak need not know which one runs. A
-//! filter whose measurement is another (forces and speeds of a quarter car, with a time step) states it
-//! as its [`Estimator::Measurement`].
+//! Every filter has a module of its own with its state, configuration and errors, and implements
+//! [`Estimator`]: code that only wants the curve's peak need not know which one runs. A filter whose
+//! measurement is another states it as its [`Estimator::Measurement`].
 
 pub mod efficient;
 pub mod mu_slip;
-pub mod quarter_car;
-pub mod road_bank;
 
 use crate::real::Real;
 
@@ -59,6 +56,17 @@ pub trait Estimator<T: Real> {
 
     /// The peak of the curve as estimated now.
     fn peak(&self) -> PeakEstimate<T>;
+}
+
+/// Whether a measurement changed the estimate.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub enum Decision {
+    /// It did.
+    Accepted,
+    /// It failed the gate on the normalised innovation; the estimate is what it was.
+    Rejected,
 }
 
 /// One measured point of the mu-slip curve with the uncertainty of its friction.

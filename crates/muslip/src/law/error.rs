@@ -2,7 +2,7 @@ use core::fmt;
 
 use crate::real::Real;
 
-/// A parameter of one of the laws.
+/// A parameter of one of the laws, here and in the crate `muslip-laws`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -12,19 +12,19 @@ pub enum Parameter {
     PeakFriction,
     /// sp of [`Rudd`](super::Rudd).
     CriticalSlip,
-    /// c1 of [`Burckhardt`](super::Burckhardt).
+    /// c1 of Burckhardt's law.
     C1,
-    /// c2 of [`Burckhardt`](super::Burckhardt).
+    /// c2 of Burckhardt's law.
     C2,
-    /// c3 of [`Burckhardt`](super::Burckhardt).
+    /// c3 of Burckhardt's law.
     C3,
-    /// B of [`MagicFormula`](super::MagicFormula).
+    /// B of the Magic Formula.
     StiffnessFactor,
-    /// C of [`MagicFormula`](super::MagicFormula).
+    /// C of the Magic Formula.
     ShapeFactor,
-    /// D of [`MagicFormula`](super::MagicFormula).
+    /// D of the Magic Formula.
     PeakFactor,
-    /// E of [`MagicFormula`](super::MagicFormula).
+    /// E of the Magic Formula.
     CurvatureFactor,
 }
 
@@ -70,12 +70,11 @@ impl fmt::Display for LawError {
 
 impl core::error::Error for LawError {}
 
-/// `value` where it is finite and `in_range`.
-pub(super) fn validated<T: Real>(
-    value: T,
-    parameter: Parameter,
-    in_range: bool,
-) -> Result<T, LawError> {
+/// `value` where it is finite and `in_range`: what a law's constructor does with each parameter.
+///
+/// # Errors
+/// [`LawError::NonFinite`] or [`LawError::OutOfRange`] of `parameter`.
+pub fn validated<T: Real>(value: T, parameter: Parameter, in_range: bool) -> Result<T, LawError> {
     if !value.is_finite() {
         Err(LawError::NonFinite(parameter))
     } else if !in_range {

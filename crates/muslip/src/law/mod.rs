@@ -1,19 +1,17 @@
 //! Tyre laws: friction as a function of slip.
 //!
+//! [`TyreLaw`] is what every law offers, [`Rudd`] the filter's own; Burckhardt's and the Magic Formula are
+//! in the crate `muslip-laws`.
+//!
 //! Every law is odd in slip: for negative slip (a driven wheel, or noise around free rolling) friction
 //! is minus that of the mirrored slip. Constructors validate; a law that exists is a usable one.
 
-pub mod burckhardt;
 mod error;
-pub mod magic_formula;
-pub mod rudd;
+mod rudd;
 
-use nalgebra::{SMatrix, SVector};
-
-pub use burckhardt::Burckhardt;
-pub use error::{LawError, Parameter};
-pub use magic_formula::MagicFormula;
-pub use rudd::Rudd;
+pub use error::{LawError, Parameter, validated};
+pub(crate) use rudd::expand;
+pub use rudd::{Expansion, Rudd};
 
 use crate::real::Real;
 
@@ -46,14 +44,14 @@ pub trait TyreLaw<T: Real, const N: usize>: Copy {
     /// Names of the parameters in the order of [`TyreLaw::parameters`].
     const PARAMETER_NAMES: [&'static str; N];
 
-    /// The parameters θ as a vector.
-    fn parameters(&self) -> SVector<T, N>;
+    /// The parameters θ.
+    fn parameters(&self) -> [T; N];
 
     /// The law with these parameters.
     ///
     /// # Errors
     /// [`LawError`] naming the first parameter that is not finite or outside its range.
-    fn from_parameters(parameters: &SVector<T, N>) -> Result<Self, LawError>;
+    fn from_parameters(parameters: &[T; N]) -> Result<Self, LawError>;
 
     /// Friction at a slip.
     fn friction(&self, slip_ratio: T) -> T;
@@ -62,10 +60,10 @@ pub trait TyreLaw<T: Real, const N: usize>: Copy {
     fn slip_derivative(&self, slip_ratio: T) -> T;
 
     /// First derivatives of friction with respect to the parameters.
-    fn gradient(&self, slip_ratio: T) -> SVector<T, N>;
+    fn gradient(&self, slip_ratio: T) -> [T; N];
 
-    /// Second derivatives of friction with respect to the parameters.
-    fn hessian(&self, slip_ratio: T) -> SMatrix<T, N, N>;
+    /// Second derivatives of friction with respect to the parameters, row by row.
+    fn hessian(&self, slip_ratio: T) -> [[T; N]; N];
 
     /// The largest friction over slip 0..=1 and where it lies.
     fn peak(&self) -> Peak<T>;

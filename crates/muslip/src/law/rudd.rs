@@ -1,7 +1,5 @@
 //! The two-parameter law of the mu-slip filter.
 
-use nalgebra::{SMatrix, SVector};
-
 use super::error::validated;
 use super::{LawError, Parameter, Peak, TyreLaw};
 use crate::real::Real;
@@ -44,7 +42,7 @@ impl<T: Real> TryFrom<Unchecked<T>> for Rudd<T> {
 
 /// Friction and its derivatives in the two parameters, at one slip: what a filter needs of a law.
 ///
-/// [`Rudd::expansion`] makes one of the law itself. What stands between the law and a reading (a
+/// [`Rudd::expansion`] makes one of the law itself, [`State::expansion`](crate::filter::mu_slip::State::expansion) of a filter's state. What stands between the law and a reading (a
 /// low-pass filter, say) may change the five numbers alike: they are then those of the reading expected.
 /// ∂²mu/∂mup² is zero. All dimensionless.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -150,12 +148,12 @@ impl<T: Real> Rudd<T> {
 impl<T: Real> TyreLaw<T, 2> for Rudd<T> {
     const PARAMETER_NAMES: [&'static str; 2] = ["peak_friction", "critical_slip"];
 
-    fn parameters(&self) -> SVector<T, 2> {
-        SVector::<T, 2>::new(self.peak_friction, self.critical_slip)
+    fn parameters(&self) -> [T; 2] {
+        [self.peak_friction, self.critical_slip]
     }
 
-    fn from_parameters(parameters: &SVector<T, 2>) -> Result<Self, LawError> {
-        let [[peak_friction, critical_slip]] = parameters.data.0;
+    fn from_parameters(parameters: &[T; 2]) -> Result<Self, LawError> {
+        let [peak_friction, critical_slip] = *parameters;
         Self::new(peak_friction, critical_slip)
     }
 
@@ -171,14 +169,14 @@ impl<T: Real> TyreLaw<T, 2> for Rudd<T> {
         T::TWO * self.peak_friction * self.critical_slip * ((sp2 - s2) * w) * w
     }
 
-    fn gradient(&self, slip_ratio: T) -> SVector<T, 2> {
+    fn gradient(&self, slip_ratio: T) -> [T; 2] {
         let e = self.expansion(slip_ratio);
-        SVector::<T, 2>::new(e.by_peak_friction, e.by_critical_slip)
+        [e.by_peak_friction, e.by_critical_slip]
     }
 
-    fn hessian(&self, slip_ratio: T) -> SMatrix<T, 2, 2> {
+    fn hessian(&self, slip_ratio: T) -> [[T; 2]; 2] {
         let e = self.expansion(slip_ratio);
-        SMatrix::<T, 2, 2>::new(T::ZERO, e.by_both, e.by_both, e.by_critical_slip_twice)
+        [[T::ZERO, e.by_both], [e.by_both, e.by_critical_slip_twice]]
     }
 
     fn peak(&self) -> Peak<T> {
@@ -210,7 +208,7 @@ mod tests {
         let g = law.gradient(0.15);
         assert!((g[0] - 1.0).abs() < 1e-15 && g[1] == 0.0);
         // d²mu/dsp² = -mup/sp² at the peak
-        assert!((law.hessian(0.15)[(1, 1)] + 0.35 / 0.0225).abs() < 1e-12);
+        assert!((law.hessian(0.15)[1][1] + 0.35 / 0.0225).abs() < 1e-12);
     }
 
     #[test]

@@ -2,5 +2,5 @@
 #![forbid(unsafe_code)]
 
 fn main() -> std::process::ExitCode {
-    host_sim::cli::main()
+    muslip_cli::main()
 }

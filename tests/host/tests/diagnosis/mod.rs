@@ -5,8 +5,7 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use host_sim::rig_file::RigFile;
-use host_sim::simulate::Scenario;
+use host_sim::Scenario;
 use muslip_diagnose::campaign::Rig;
 use muslip_diagnose::mechanism::{Before, Context, Id};
 use muslip_diagnose::outcome::{
@@ -18,6 +17,7 @@ use muslip_diagnose::repaired::{
     Correction, Domain, KnownRecording, NoiseModel, Predicting, Repaired, RepairedParameter,
     RepairedTerm,
 };
+use muslip_recordings::rig_file::RigFile;
 
 /// A file of the contract as the repository has it.
 pub fn contract(name: &str) -> String {

@@ -7,7 +7,8 @@ use super::estimate::{
 };
 use super::judge::{MOST_SAMPLES, judge};
 use super::sums::Sums;
-use crate::filter::mu_slip::{Decision, State};
+use crate::filter::Decision;
+use crate::filter::mu_slip::State;
 use crate::real::Real;
 
 /// Longest step of ln sp between two passes over the bins.

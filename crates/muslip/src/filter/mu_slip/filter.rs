@@ -1,9 +1,9 @@
 use super::config::Config;
 use super::error::{Input, UpdateError};
 use super::state::{Covariance, Estimate, State};
-use super::update::{Choices, Decision, Fusion, Inputs};
-use crate::filter::{Estimator, FrictionMeasurement, PeakEstimate};
-use crate::law::rudd::{self, Expansion};
+use super::update::{Choices, Fusion, Inputs};
+use crate::filter::{Decision, Estimator, FrictionMeasurement, PeakEstimate};
+use crate::law::{Expansion, expand};
 use crate::real::Real;
 
 /// The filter: a validated configuration and the present estimate.
@@ -48,7 +48,7 @@ impl<T: Real> MuSlipFilter<T> {
     /// Corrects the estimate with a measurement that does not read the law at its slip but something made
     /// of it, which `expected` predicts at the present state; or rejects it at the gate.
     ///
-    /// [`Compensator::step`](crate::compensate::Compensator::step) makes both arguments. The slip is
+    /// `Compensator::step` of the crate `muslip-compensate` makes both arguments. The slip is
     /// reported and not computed with. With the law's own expansion it is [`Estimator::update`], bit for
     /// bit.
     ///
@@ -121,7 +121,7 @@ impl<T: Real> Estimator<T> for MuSlipFilter<T> {
             peak_friction,
             critical_slip,
         } = self.estimate.state;
-        let expected = rudd::expand(peak_friction, critical_slip, measurement.slip_ratio);
+        let expected = expand(peak_friction, critical_slip, measurement.slip_ratio);
         self.fuse(measurement, expected)
     }
 

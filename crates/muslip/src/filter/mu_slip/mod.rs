@@ -20,7 +20,7 @@
 //!
 //! Five ways in: [`update_unchecked`] (leanest, one division), [`update`] (the same checked, two divisions), [`update_reporting`]
 //! (the same with innovation, noise and gain), [`update_expecting`] (for a measurement that reads
-//! something made of the law, see [`compensate`](crate::compensate)), and [`MuSlipFilter`], which adds
+//! something made of the law, as the crate `muslip-compensate` does), and [`MuSlipFilter`], which adds
 //! configuration, an optional gate and the [`Estimator`](crate::filter::Estimator) trait.
 //!
 //! The filter does not hold the state to positive values, as the article's does not: one bad
@@ -35,5 +35,5 @@ mod update;
 pub use config::{Config, CovarianceForm, Range};
 pub use error::{ConfigError, ConfigParameter, Input, UpdateError};
 pub use filter::MuSlipFilter;
-pub use state::{Covariance, Estimate, State};
-pub use update::{Decision, Fusion, update, update_expecting, update_reporting, update_unchecked};
+pub use state::{Covariance, Estimate, NotSymmetric, State};
+pub use update::{Fusion, update, update_expecting, update_reporting, update_unchecked};

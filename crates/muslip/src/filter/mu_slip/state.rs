@@ -1,6 +1,6 @@
-use nalgebra::{SMatrix, SVector};
+use core::fmt;
 
-use crate::law::{LawError, Rudd};
+use crate::law::{Expansion, LawError, Rudd, expand};
 use crate::real::Real;
 
 /// The state x = (mup, sp).
@@ -35,6 +35,19 @@ pub struct Covariance<T> {
     pub p11: T,
 }
 
+/// A matrix that is no covariance: its entries off the diagonal differ.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct NotSymmetric;
+
+impl fmt::Display for NotSymmetric {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("matrix is not symmetric")
+    }
+}
+
+impl core::error::Error for NotSymmetric {}
+
 /// State and covariance together: all that the filter carries from one sample to the next.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -47,14 +60,13 @@ pub struct Estimate<T> {
 }
 
 impl<T: Real> State<T> {
-    /// The state as the vector (mup, sp).
-    pub fn to_vector(self) -> SVector<T, 2> {
-        SVector::<T, 2>::new(self.peak_friction, self.critical_slip)
+    /// The two numbers in the order mup, sp.
+    pub fn to_array(self) -> [T; 2] {
+        [self.peak_friction, self.critical_slip]
     }
 
-    /// The state from the vector (mup, sp).
-    pub fn from_vector(vector: &SVector<T, 2>) -> Self {
-        let [[peak_friction, critical_slip]] = vector.data.0;
+    /// From the two numbers in the order mup, sp.
+    pub fn from_array([peak_friction, critical_slip]: [T; 2]) -> Self {
         Self {
             peak_friction,
             critical_slip,
@@ -79,6 +91,12 @@ impl<T: Real> State<T> {
     pub fn law(&self) -> Result<Rudd<T>, LawError> {
         Rudd::new(self.peak_friction, self.critical_slip)
     }
+
+    /// Friction and its derivatives at a slip, whether or not the state is a tyre's.
+    #[inline(always)]
+    pub fn expansion(&self, slip_ratio: T) -> Expansion<T> {
+        expand(self.peak_friction, self.critical_slip, slip_ratio)
+    }
 }
 
 impl<T: Real> Covariance<T> {
@@ -91,15 +109,21 @@ impl<T: Real> Covariance<T> {
         }
     }
 
-    /// The 2×2 matrix P.
-    pub fn to_matrix(self) -> SMatrix<T, 2, 2> {
-        SMatrix::<T, 2, 2>::new(self.p00, self.p01, self.p01, self.p11)
+    /// The two rows of P, which are its columns as well.
+    pub fn rows(&self) -> [[T; 2]; 2] {
+        [[self.p00, self.p01], [self.p01, self.p11]]
     }
 
-    /// From a 2×2 matrix; `None` where its off-diagonal entries differ.
-    pub fn from_matrix(matrix: &SMatrix<T, 2, 2>) -> Option<Self> {
-        let [[p00, p10], [p01, p11]] = matrix.data.0;
-        (p01 == p10).then_some(Self { p00, p01, p11 })
+    /// From the two rows of a matrix.
+    ///
+    /// # Errors
+    /// [`NotSymmetric`] where the two entries off the diagonal differ, or are NaN.
+    pub fn from_rows([[p00, p01], [p10, p11]]: [[T; 2]; 2]) -> Result<Self, NotSymmetric> {
+        if p01 == p10 {
+            Ok(Self { p00, p01, p11 })
+        } else {
+            Err(NotSymmetric)
+        }
     }
 
     /// Variance of peak friction, P11.
@@ -166,27 +190,26 @@ impl<T: Real> Covariance<T> {
 
 #[cfg(test)]
 mod tests {
-    use super::{Covariance, State};
-    use nalgebra::{Matrix2, Vector2};
+    use super::{Covariance, NotSymmetric, State};
 
     #[test]
-    fn vectors_and_matrices_go_both_ways() {
+    fn arrays_go_both_ways() {
         let state = State {
             peak_friction: 0.6,
             critical_slip: 0.2,
         };
-        assert_eq!(state.to_vector(), Vector2::new(0.6, 0.2));
-        assert_eq!(State::from_vector(&state.to_vector()), state);
+        assert_eq!(state.to_array(), [0.6, 0.2]);
+        assert_eq!(State::from_array(state.to_array()), state);
         let p = Covariance {
             p00: 4.0,
             p01: 1.0,
             p11: 9.0,
         };
-        assert_eq!(p.to_matrix(), Matrix2::new(4.0, 1.0, 1.0, 9.0));
-        assert_eq!(Covariance::from_matrix(&p.to_matrix()), Some(p));
+        assert_eq!(p.rows(), [[4.0, 1.0], [1.0, 9.0]]);
+        assert_eq!(Covariance::from_rows(p.rows()), Ok(p));
         assert_eq!(
-            Covariance::from_matrix(&Matrix2::new(4.0, 1.0, 1.1, 9.0)),
-            None
+            Covariance::from_rows([[4.0, 1.0], [1.1, 9.0]]),
+            Err(NotSymmetric)
         );
         assert_eq!(p.std(), (2.0, 3.0));
         assert!((p.correlation() - 1.0_f64 / 6.0).abs() < 1e-16);

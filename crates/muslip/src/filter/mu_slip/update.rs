@@ -3,19 +3,9 @@
 use super::config::CovarianceForm;
 use super::error::{Input, UpdateError};
 use super::state::{Covariance, Estimate, State};
-use crate::law::rudd::{self, Expansion};
+use crate::filter::Decision;
+use crate::law::{Expansion, expand};
 use crate::real::Real;
-
-/// Whether a measurement changed the estimate.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub enum Decision {
-    /// It did.
-    Accepted,
-    /// It failed the gate on the normalised innovation; the estimate is what it was.
-    Rejected,
-}
 
 /// What one measurement did. All dimensionless.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -99,7 +89,7 @@ impl<T: Real> Inputs<T> {
             state,
             covariance,
             slip_ratio,
-            expected: rudd::expand(state.peak_friction, state.critical_slip, slip_ratio),
+            expected: expand(state.peak_friction, state.critical_slip, slip_ratio),
             friction,
             measurement_variance,
         }

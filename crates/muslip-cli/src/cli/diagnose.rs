@@ -1,0 +1,122 @@
+//! `muslip diagnose`.
+
+use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
+
+use clap::Args;
+use muslip_diagnose::outcome::Diagnosis;
+use muslip_recordings::load;
+use muslip_report::diagnose::files::{self, WriteError};
+use muslip_report::diagnose::page;
+use muslip_report::diagnose::summary::{WIDEST_LINE, summary};
+use muslip_report::diagnose::views::Views;
+use muslip_report::{FigureFormat, write_figures};
+
+use super::failure::Failure;
+use super::progress::Progress;
+use super::terminal::Terminal;
+
+/// Find what the simulation leaves out of recordings: where, which mechanism, how large, how sure.
+///
+/// Writes diagnosis.json, model.toml (the repaired model: see `predict` and `estimate --model`) and
+/// report.html into a folder, all together at the end. Give several recordings of one rig: some are kept
+/// back to prove the repair on. Faults of the data are no reason to stop: they are listed, and the rest
+/// is used.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:\n  \
+muslip diagnose --rig rig.toml --out found run1.csv run2.csv run3.csv\n  \
+muslip diagnose --rig rig.toml --out found --json runs/*.csv | jq .verdict")]
+pub(super) struct Arguments {
+    /// Rig file (TOML).
+    #[arg(long, value_name = "RIG.toml")]
+    rig: PathBuf,
+    /// Folder for the three files; made if it is not there.
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+    /// Also write the report's figures for a document, into DIR/figures.
+    #[arg(long, value_enum)]
+    format: Option<FigureFormat>,
+    /// Print diagnosis.json and nothing else.
+    #[arg(long)]
+    json: bool,
+    /// The recordings (CSV), one file a run.
+    #[arg(value_name = "RUN.csv", required = true)]
+    recordings: Vec<PathBuf>,
+}
+
+/// Steps of the bar; reading takes the first of them.
+const STEPS: f64 = 1000.0;
+const READING: f64 = 100.0;
+
+pub(super) fn run(arguments: &Arguments, terminal: &mut Terminal) -> Result<(), Failure> {
+    let out = &arguments.out;
+    let (diagnosis, views) = diagnosed(&arguments.rig, &arguments.recordings, out)?;
+    let text = files::write(out, &diagnosis, &views, &command(arguments))?;
+    if let Some(format) = arguments.format {
+        let report = page::report(&diagnosis, &views, "");
+        let figures = report.figures();
+        let figures = figures.iter().map(|(name, figure)| (name.clone(), figure));
+        write_figures(&out.join("figures"), figures, format)?;
+    }
+    if arguments.json {
+        return terminal.bytes(text.as_bytes());
+    }
+    let summary = summary(&diagnosis, out, terminal.width(WIDEST_LINE));
+    for line in &summary.verdict {
+        terminal.verdict(line, summary.good)?;
+    }
+    for line in &summary.lines {
+        terminal.line(line)?;
+    }
+    Ok(())
+}
+
+/// Reads and diagnoses a campaign under a bar; the demo does too. The folder for what is found is made
+/// when the input has been read, so that bad input leaves nothing behind.
+pub(super) fn diagnosed(
+    rig: &Path,
+    recordings: &[PathBuf],
+    out: &Path,
+) -> Result<(Diagnosis, Views), Failure> {
+    let bar = Mutex::new(Progress::new("read", STEPS as u64));
+    let tell = |what: &str, steps: f64| {
+        let mut bar = bar.lock().unwrap_or_else(PoisonError::into_inner);
+        bar.says(what);
+        bar.done(steps as u64);
+    };
+    let campaign = load::campaign(rig, recordings, &|share| {
+        tell("read", READING * share);
+    })?;
+    files::prepare_folder(out)?;
+    Ok(files::diagnosed(campaign, &|share, what| {
+        tell(what, READING + (STEPS - READING) * share);
+    }))
+}
+
+/// The command that makes the report again, without where it goes.
+fn command(arguments: &Arguments) -> String {
+    let recordings: Vec<String> = arguments
+        .recordings
+        .iter()
+        .map(|path| shown(path))
+        .collect();
+    format!(
+        "muslip diagnose --rig {} {}",
+        shown(&arguments.rig),
+        recordings.join(" ")
+    )
+}
+
+fn shown(path: &Path) -> String {
+    path.display().to_string()
+}
+
+impl From<WriteError> for Failure {
+    fn from(error: WriteError) -> Self {
+        match error {
+            WriteError::Output(error) => Self::Output(error),
+            WriteError::Report(error) => error.into(),
+            error @ WriteError::Text(_) => Self::Internal(error.to_string()),
+        }
+    }
+}

@@ -1,0 +1,349 @@
+//! `muslip estimate`.
+
+use std::io::{self, BufWriter, Write};
+use std::path::{Path, PathBuf};
+
+use clap::{Args, ValueEnum};
+use muslip::filter::mu_slip::Range;
+use muslip_analysis::estimate::{
+    EstimateError, EstimateOptions, EstimateResult, EstimatorKind, TraceFormat, TraceWriter,
+    estimate,
+};
+use muslip_analysis::wording::{
+    consistency_sentence, estimate_sentence, model_sentences, noise_sentence,
+};
+use muslip_recordings::model_file::ModelFile;
+use muslip_recordings::output::{OutputError, OutputFile, write_file};
+use muslip_recordings::recording::Recording;
+use muslip_recordings::rig_file::RigFile;
+use muslip_report::{CurveLabel, FigureFormat, of_estimate, write_figures};
+
+use super::failure::Failure;
+use super::progress::Progress;
+use super::terminal::Terminal;
+
+/// The name that stands for standard output.
+const PRINTED: &str = "-";
+
+/// Estimate peak friction and the slip of the peak from one recording, sample by sample.
+///
+/// Every row with finite values, a vehicle speed of at least 0.5 m/s, a normal force of at least 2 % of
+/// the recording's median and a slip between 0 and 1 (with a margin of 0.05 for noise) is a measurement;
+/// others are skipped and counted.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:\n  \
+muslip estimate --rig rig.toml run.csv\n  \
+muslip estimate --rig rig.toml --range automotive --report run.html run.csv\n  \
+muslip estimate --rig rig.toml --trace trace.csv --json run.csv\n  \
+muslip estimate --rig rig.toml --model found/model.toml run.csv")]
+pub(super) struct Arguments {
+    /// Rig file (TOML).
+    #[arg(long, value_name = "RIG.toml")]
+    rig: PathBuf,
+    #[command(flatten)]
+    choices: Choices,
+    /// Compensate what a diagnosis found, sample by sample: `model.toml` as `diagnose` writes it. Effects
+    /// that can be compensated are radius, delay, lag, zero drift, crosstalk, load and speed
+    /// sensitivity, relaxation and tread temperature; others are named and left.
+    #[arg(long, value_name = "MODEL.toml")]
+    model: Option<PathBuf>,
+    /// Write the estimate after every sample: CSV, or JSON where the name ends in .json or .jsonl; `-`
+    /// prints it as CSV in place of the words.
+    #[arg(long, value_name = "TRACE.csv")]
+    trace: Option<PathBuf>,
+    /// Write a report with plots.
+    #[arg(long, value_name = "OUT.html")]
+    report: Option<PathBuf>,
+    /// Also write the report's figures for a document, into the folder OUT-figures beside it.
+    #[arg(long, value_enum, requires = "report")]
+    format: Option<FigureFormat>,
+    /// Print one JSON object and nothing else.
+    #[arg(long)]
+    json: bool,
+    /// The recording (CSV).
+    #[arg(value_name = "RUN.csv")]
+    recording: PathBuf,
+}
+
+/// How to estimate; the campaign has the same.
+#[derive(Debug, Args)]
+pub(super) struct Choices {
+    /// Where the filter starts: peak friction 0.6 (aircraft) or 1.0 (automotive), each give or take
+    /// itself.
+    #[arg(long, value_enum, default_value_t = RangeChoice::Aircraft)]
+    range: RangeChoice,
+    /// Which filter estimates; efficient unless a model with a low-pass filter on the force is
+    /// compensated.
+    #[arg(long, value_enum)]
+    estimator: Option<EstimatorChoice>,
+}
+
+impl Choices {
+    pub(super) fn options(&self) -> EstimateOptions {
+        EstimateOptions {
+            estimator: self.estimator.map(|choice| match choice {
+                EstimatorChoice::Article => EstimatorKind::Article,
+                EstimatorChoice::Efficient => EstimatorKind::Efficient,
+            }),
+            range: self.range.into(),
+        }
+    }
+
+    /// The choices as arguments.
+    pub(super) fn words(&self) -> String {
+        let options = self.options();
+        let range = muslip_analysis::estimate::range_word(options.range);
+        match options.estimator {
+            Some(estimator) => format!("--range {range} --estimator {}", estimator.word()),
+            None => format!("--range {range}"),
+        }
+    }
+}
+
+/// `--range`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(super) enum RangeChoice {
+    Aircraft,
+    Automotive,
+}
+
+impl From<RangeChoice> for Range {
+    fn from(choice: RangeChoice) -> Self {
+        match choice {
+            RangeChoice::Aircraft => Self::Aircraft,
+            RangeChoice::Automotive => Self::Automotive,
+        }
+    }
+}
+
+/// `--estimator`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum EstimatorChoice {
+    /// The article's extended Kalman filter: three times the noise, pseudonoise.
+    Article,
+    /// As accurate as a batch fit by maximum likelihood; learns the noise, rejects outliers.
+    Efficient,
+}
+
+pub(super) fn run(arguments: &Arguments, terminal: &mut Terminal) -> Result<(), Failure> {
+    let trace_is_printed = arguments.trace.as_deref() == Some(Path::new(PRINTED));
+    if trace_is_printed && arguments.json {
+        return Err(Failure::Usage(
+            "--trace - and --json would both print: give one of them a file".into(),
+        ));
+    }
+    let job = Job {
+        rig_path: &arguments.rig,
+        recording_path: &arguments.recording,
+        options: arguments.choices.options(),
+        model_path: arguments.model.as_deref(),
+        trace: arguments.trace.as_deref(),
+        report: arguments.report.as_deref(),
+        format: arguments.format,
+        beside: None,
+    };
+    let result = job.run()?;
+    if trace_is_printed {
+        return Ok(());
+    }
+    if arguments.json {
+        return terminal.json(&result.to_json());
+    }
+    terminal.headline(&format!(
+        "{}: {}",
+        arguments.recording.display(),
+        estimate_sentence(&result)
+    ))?;
+    terminal.line("")?;
+    tell(&result, terminal)?;
+    for path in [&arguments.trace, &arguments.report].into_iter().flatten() {
+        terminal.line(&format!("Written: {}", path.display()))?;
+    }
+    Ok(())
+}
+
+/// An estimate with its files; the demo runs one too.
+pub(super) struct Job<'a> {
+    pub(super) rig_path: &'a Path,
+    pub(super) recording_path: &'a Path,
+    pub(super) options: EstimateOptions,
+    pub(super) model_path: Option<&'a Path>,
+    pub(super) trace: Option<&'a Path>,
+    pub(super) report: Option<&'a Path>,
+    pub(super) format: Option<FigureFormat>,
+    pub(super) beside: Option<CurveLabel>,
+}
+
+impl Job<'_> {
+    pub(super) fn run(&self) -> Result<EstimateResult, Failure> {
+        let bytes = 2 * Recording::announced_length_bytes(self.recording_path)?;
+        let mut progress = Progress::bytes("estimate", bytes);
+        self.run_reporting(&mut |bytes| progress.done(bytes))
+    }
+
+    /// As [`Job::run`]; `progress` is told the bytes gone through, of twice the recording's length.
+    pub(super) fn run_reporting(
+        &self,
+        progress: &mut dyn FnMut(u64),
+    ) -> Result<EstimateResult, Failure> {
+        let rig = RigFile::read(self.rig_path)?;
+        let model = match self.model_path {
+            Some(path) => {
+                let model = ModelFile::read(path)?;
+                model.check_rig(self.rig_path, &rig)?;
+                Some(model.repaired)
+            }
+            None => None,
+        };
+        let mut recording = Recording::open(self.recording_path)?;
+        // Outputs are begun before the work, so that a folder that is not there is told at once.
+        let report = self.report.map(OutputFile::create).transpose()?;
+        drop(report);
+        let mut trace = match self.trace {
+            Some(path) => {
+                let writer = TraceWriter::new(TraceSink::create(path)?, TraceFormat::of(path));
+                Some(writer.map_err(|error| trace_failure(path, error))?)
+            }
+            None => None,
+        };
+        let result = estimate(
+            &mut recording,
+            &rig,
+            self.options,
+            model.as_ref(),
+            trace.as_mut(),
+            progress,
+        )
+        .map_err(|error| self.failure(error))?;
+        if let (Some(trace), Some(path)) = (trace, self.trace) {
+            let sink = trace.finish().map_err(|error| trace_failure(path, error))?;
+            sink.commit()?;
+        }
+        if let Some(path) = self.report {
+            let page = of_estimate(
+                self.recording_path,
+                &result,
+                self.beside.as_ref(),
+                &self.command(&result),
+            );
+            write_file(path, page.to_html()?.as_bytes())?;
+            if let Some(format) = self.format {
+                let figures = page.figures();
+                let figures = figures.iter().map(|(name, figure)| (name.clone(), figure));
+                write_figures(&figures_folder(path), figures, format)?;
+            }
+        }
+        Ok(result)
+    }
+
+    fn failure(&self, error: EstimateError) -> Failure {
+        match (error, self.trace, self.model_path) {
+            (EstimateError::Trace(error), Some(path), _) => trace_failure(path, error),
+            (EstimateError::Model(what), _, Some(path)) => {
+                Failure::Usage(format!("{}: {what}", path.display()))
+            }
+            (error, _, _) => error.into(),
+        }
+    }
+
+    /// The command that makes the report again.
+    fn command(&self, result: &EstimateResult) -> String {
+        let model = match self.model_path {
+            Some(path) => format!("--model {} ", path.display()),
+            None => String::new(),
+        };
+        format!(
+            "muslip estimate --rig {} --range {} --estimator {} {model}{}",
+            self.rig_path.display(),
+            muslip_analysis::estimate::range_word(self.options.range),
+            result.estimator.word(),
+            self.recording_path.display()
+        )
+    }
+}
+
+/// The folder of a report's figures: `run.html` has `run-figures`.
+fn figures_folder(report: &Path) -> PathBuf {
+    let mut name = report.file_stem().unwrap_or_default().to_owned();
+    name.push("-figures");
+    report.with_file_name(name)
+}
+
+/// Where a trace goes.
+enum TraceSink {
+    File(OutputFile),
+    Printed(BufWriter<io::Stdout>),
+}
+
+impl TraceSink {
+    fn create(path: &Path) -> Result<Self, OutputError> {
+        if path == Path::new(PRINTED) {
+            return Ok(Self::Printed(BufWriter::new(io::stdout())));
+        }
+        OutputFile::create(path).map(Self::File)
+    }
+
+    fn commit(self) -> Result<(), Failure> {
+        match self {
+            Self::File(file) => Ok(file.commit()?),
+            Self::Printed(mut out) => out.flush().map_err(Failure::Terminal),
+        }
+    }
+}
+
+impl Write for TraceSink {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        match self {
+            Self::File(file) => file.write(bytes),
+            Self::Printed(out) => out.write(bytes),
+        }
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        match self {
+            Self::File(file) => file.flush(),
+            Self::Printed(out) => out.flush(),
+        }
+    }
+}
+
+fn trace_failure(path: &Path, error: io::Error) -> Failure {
+    if path == Path::new(PRINTED) {
+        Failure::Terminal(error)
+    } else {
+        OutputError::new(path, error).into()
+    }
+}
+
+/// The result below its headline.
+pub(super) fn tell(result: &EstimateResult, terminal: &mut Terminal) -> Result<(), Failure> {
+    let peak = &result.peak;
+    let skipped = match result.skipped.total() {
+        0 => "none skipped".to_owned(),
+        total => format!("{total} skipped ({})", result.skipped.in_words()),
+    };
+    terminal.table(&[
+        (
+            "peak friction",
+            format!(
+                "{:.5}  1-sigma {:.5}",
+                peak.peak_friction, peak.peak_friction_std
+            ),
+        ),
+        (
+            "critical slip",
+            format!(
+                "{:.5}  1-sigma {:.5}",
+                peak.critical_slip, peak.critical_slip_std
+            ),
+        ),
+        ("correlation", format!("{:.3}", peak.correlation)),
+        ("samples", format!("{} used, {skipped}", result.used)),
+    ])?;
+    terminal.line("")?;
+    for sentence in result.model.iter().flat_map(model_sentences) {
+        terminal.paragraph(&sentence)?;
+    }
+    terminal.paragraph(&consistency_sentence(&result.consistency, result.estimator))?;
+    terminal.paragraph(&noise_sentence(&result.survey))
+}

@@ -1,0 +1,341 @@
+//! `muslip rig`.
+
+use std::path::PathBuf;
+use std::time::{Duration, Instant};
+
+use clap::{Args, Subcommand};
+use muslip_record::{
+    Command, Event, Fault, Parameters, Profile, Program, STEPS, State, Status, Telemetry,
+};
+use muslip_recordings::input_error::one_line;
+
+use super::failure::Failure;
+use super::rig_view::{LiveView, Seen};
+use super::terminal::Terminal;
+use crate::rig_link::{Port, Recorder, RigError, Session, parse_parameters, write_parameters};
+
+/// Work a rig: arm it, run a brake profile, record while it runs.
+///
+/// The controller dumps the brake when this program falls silent for a quarter of a second, so that ending it
+/// by force is a stop. docs/rig.md has the wiring and the way from the box to the first ramp.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:\n  \
+muslip rig --port /dev/ttyUSB0 status\n  \
+muslip rig --port /dev/ttyUSB0 tare\n  \
+muslip rig --port /dev/ttyUSB0 parameters > rig-parameters.toml\n  \
+muslip rig --port /dev/ttyUSB0 parameters --set rig-parameters.toml\n  \
+muslip rig --port /dev/ttyUSB0 run --ramp 0.5 --applications 3 --out run.csv\n  \
+muslip rig --port tcp:127.0.0.1:4500 run --slip 0.1 --hold 2 --out hold.csv")]
+pub(super) struct Arguments {
+    /// Serial port of the controller, tcp:HOST:PORT or unix:PATH.
+    #[arg(long)]
+    port: String,
+    #[command(subcommand)]
+    action: Action,
+}
+
+#[derive(Debug, Subcommand)]
+enum Action {
+    /// Where the controller is, what stands against arming, what the link has seen.
+    Status,
+    /// Take the present bridge readings as no force; the rig must stand and the tyre be lifted.
+    Tare,
+    /// Unlatch a fault whose cause is gone.
+    Clear,
+    /// Print the parameters, or set all of them from a file.
+    Parameters {
+        /// File to set them from (TOML, as printed).
+        #[arg(long, value_name = "PARAMETERS.toml")]
+        set: Option<PathBuf>,
+    },
+    /// Arm, run a profile, record until it is done.
+    Run(Run),
+}
+
+#[derive(Debug, Args)]
+struct Run {
+    /// Pressure rises by this share of the full pressure a second until the wheel skids.
+    #[arg(long, value_name = "SHARE/S", group = "program")]
+    ramp: Option<f32>,
+    /// Pressure is held at these shares of the full pressure, one after the other; up to eight.
+    #[arg(long, value_name = "SHARES", value_delimiter = ',', group = "program", num_args = 1..)]
+    steps: Option<Vec<f32>>,
+    /// Slip is held at this value.
+    #[arg(long, value_name = "SLIP", group = "program")]
+    slip: Option<f32>,
+    /// How long each step, or the slip, is held in s.
+    #[arg(long, value_name = "S", default_value_t = 1.0)]
+    hold: f32,
+    /// Vehicle speed in m/s from which the brake is applied.
+    #[arg(long, value_name = "M/S", default_value_t = 15.0)]
+    start_speed: f32,
+    /// Slip from which the wheel skids.
+    #[arg(long, value_name = "SLIP", default_value_t = 0.5)]
+    skid_slip: f32,
+    /// How long a skid is held in s, at most 0.15.
+    #[arg(long, value_name = "S", default_value_t = 0.05)]
+    skid_hold: f32,
+    /// Brake applications.
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    applications: u8,
+    /// Pause after each application in s.
+    #[arg(long, value_name = "S", default_value_t = 5.0)]
+    cool: f32,
+    /// Where the recording goes, line by line as it happens.
+    #[arg(long, value_name = "RUN.csv")]
+    out: PathBuf,
+}
+
+impl From<RigError> for Failure {
+    fn from(error: RigError) -> Self {
+        Self::Usage(one_line(&error.to_string()))
+    }
+}
+
+pub(super) fn run(arguments: &Arguments, terminal: &mut Terminal) -> Result<(), Failure> {
+    // Files first: nothing is asked of a rig that a bad file will end.
+    let parameters = match &arguments.action {
+        Action::Parameters { set: Some(path) } => Some(parse_parameters(path)?),
+        _ => None,
+    };
+    let profile = match &arguments.action {
+        Action::Run(run) => Some(profile(run)?),
+        _ => None,
+    };
+    let port = Port::open(&arguments.port)
+        .map_err(|error| Failure::Usage(one_line(&error.to_string())))?;
+    let (mut session, hello) = Session::open(port)?;
+    match &arguments.action {
+        Action::Status => {
+            if hello.emulated {
+                terminal.line("emulated controller: sensors and brake are simulated")?;
+            }
+            let status = status(&mut session)?;
+            print_status(&status, terminal)
+        }
+        Action::Tare => {
+            session.ask("tare", Command::Tare, |_| {})?;
+            let mut tared = false;
+            let start = Instant::now();
+            while !tared && start.elapsed() < Duration::from_secs(5) {
+                session.listen(|message| {
+                    tared |= matches!(
+                        message,
+                        Telemetry::Event {
+                            event: Event::Tared,
+                            ..
+                        }
+                    );
+                })?;
+            }
+            if !tared {
+                return Err(RigError::Silent.into());
+            }
+            let parameters = read_parameters(&mut session)?;
+            terminal.line(&format!(
+                "zero codes: drag {}, normal force {}",
+                parameters.drag.zero_code, parameters.normal.zero_code
+            ))
+        }
+        Action::Clear => {
+            session.ask("clear the fault", Command::ClearFault, |_| {})?;
+            terminal.line("fault cleared")
+        }
+        Action::Parameters { .. } => {
+            if let Some(parameters) = parameters {
+                let command = Command::SetParameters { parameters };
+                session.ask("take the parameters", command, |_| {})?;
+                return terminal.line("parameters taken and stored");
+            }
+            let text = write_parameters(&read_parameters(&mut session)?)
+                .map_err(|error| Failure::Internal(error.to_string()))?;
+            terminal.line(text.trim_end())
+        }
+        Action::Run(run) => match profile {
+            Some(profile) => record(run, profile, &mut session, terminal),
+            None => Ok(()),
+        },
+    }
+}
+
+fn profile(run: &Run) -> Result<Profile, Failure> {
+    let program = match (run.ramp, &run.steps, run.slip) {
+        (Some(demand_per_s), None, None) => Program::Ramp { demand_per_s },
+        (None, Some(steps), None) => {
+            let mut levels = [0.0; STEPS];
+            if steps.len() > STEPS {
+                return Err(Failure::Usage(format!("more than {STEPS} steps")));
+            }
+            for (level, &step) in levels.iter_mut().zip(steps) {
+                *level = step;
+            }
+            Program::Steps {
+                levels,
+                count: steps.len() as u8,
+                hold_s: run.hold,
+            }
+        }
+        (None, None, Some(target_slip)) => Program::SlipHold {
+            target_slip,
+            hold_s: run.hold,
+        },
+        _ => {
+            return Err(Failure::Usage(
+                "one of --ramp, --steps and --slip is needed".to_owned(),
+            ));
+        }
+    };
+    Ok(Profile {
+        program,
+        start_speed_m_s: run.start_speed,
+        skid_slip: run.skid_slip,
+        skid_hold_s: run.skid_hold,
+        applications: run.applications,
+        cool_s: run.cool,
+    })
+}
+
+fn status(session: &mut Session) -> Result<Status, RigError> {
+    let mut found = None;
+    session.ask("tell its status", Command::ReadStatus, |message| {
+        if let Telemetry::Status(status) = message {
+            found = Some(*status);
+        }
+    })?;
+    found.ok_or(RigError::Silent)
+}
+
+fn read_parameters(session: &mut Session) -> Result<Parameters, RigError> {
+    let mut found = None;
+    session.ask("tell its parameters", Command::ReadParameters, |message| {
+        if let Telemetry::Parameters(parameters) = message {
+            found = Some(*parameters);
+        }
+    })?;
+    found.ok_or(RigError::Silent)
+}
+
+fn print_status(status: &Status, terminal: &mut Terminal) -> Result<(), Failure> {
+    let fault = status
+        .fault
+        .map_or_else(|| "none".to_owned(), |fault| format!("{fault:?}"));
+    let link = &status.link;
+    terminal.table(&[
+        ("state", format!("{:?}", status.state)),
+        ("fault", fault),
+        ("interlocks that stand", standing(status.standing)),
+        (
+            "parameters",
+            if status.stored {
+                "stored"
+            } else {
+                "not stored"
+            }
+            .to_owned(),
+        ),
+        ("frames received", link.received.to_string()),
+        (
+            "frames corrupt, oversized, foreign",
+            format!("{}, {}, {}", link.corrupt, link.oversized, link.foreign),
+        ),
+        (
+            "frames repeated, lost; bytes overrun",
+            format!("{}, {}, {}", link.duplicate, link.lost, link.overrun_bytes),
+        ),
+        ("telemetry dropped", link.dropped.to_string()),
+        (
+            "worst cycles, interrupt and step",
+            format!(
+                "{}, {}",
+                status.worst_interrupt_cycles, status.worst_step_cycles
+            ),
+        ),
+        (
+            "deepest stack",
+            format!("{} bytes", status.stack_used_bytes),
+        ),
+    ])
+}
+
+fn standing(bits: u32) -> String {
+    let names: Vec<String> = Fault::ALL
+        .into_iter()
+        .filter(|&fault| bits & (1 << fault as u8) != 0)
+        .map(|fault| format!("{fault:?}"))
+        .collect();
+    if names.is_empty() {
+        "none".to_owned()
+    } else {
+        names.join(", ")
+    }
+}
+
+fn record(
+    run: &Run,
+    profile: Profile,
+    session: &mut Session,
+    terminal: &mut Terminal,
+) -> Result<(), Failure> {
+    let origin = vec![format!("recorded: muslip rig run, {profile:?}")];
+    session.ask("arm", Command::Arm, |_| {})?;
+    session.ask("start", Command::Start { profile }, |_| {})?;
+    let mut recorder = Recorder::create(&run.out, &origin)?;
+    let mut seen = Seen::default();
+    let mut view = LiveView::new();
+    let mut written = None;
+    loop {
+        session.listen(|message| match message {
+            Telemetry::Sample(sample) => {
+                seen.sample = Some(*sample);
+                if written.is_none()
+                    && sample.state > State::Armed
+                    && let Err(error) = recorder.add(sample)
+                {
+                    written = Some(error);
+                }
+            }
+            Telemetry::Estimate(estimate) => seen.estimate = Some(*estimate),
+            Telemetry::Event {
+                event: Event::Fault(fault),
+                ..
+            } => seen.fault = Some(*fault),
+            _ => {}
+        })?;
+        view.show(&seen);
+        if let Some(error) = written.take() {
+            session.ask("stop", Command::Stop, |_| {})?;
+            return Err(error.into());
+        }
+        let state = seen.sample.map_or(State::SpinUp, |sample| sample.state);
+        if matches!(state, State::Done | State::Idle | State::Fault) {
+            break;
+        }
+    }
+    drop(view);
+    let (rows, missing) = recorder.counts();
+    let (lost, bad) = session.losses();
+    terminal.line(&format!(
+        "{}: {rows} rows, {missing} samples missing; {lost} frames lost, {bad} bad",
+        run.out.display()
+    ))?;
+    if let Some(estimate) = seen.estimate {
+        terminal.headline(&format!(
+            "peak friction {:.3} ± {:.3} at slip {:.3} ± {:.3} from {} samples",
+            estimate.peak_friction,
+            estimate.p00.max(0.0).sqrt(),
+            estimate.critical_slip,
+            estimate.p11.max(0.0).sqrt(),
+            estimate.updates
+        ))?;
+    }
+    let fault = match seen.fault {
+        Some(fault) => Some(fault),
+        None => status(session)?.fault,
+    };
+    match fault {
+        None => Ok(()),
+        Some(fault) => Err(Failure::Usage(format!(
+            "fault {fault:?}: the brake was dumped; the recording is kept. When the cause is gone: muslip rig clear"
+        ))),
+    }
+}

@@ -1,0 +1,17 @@
+//! Recordings: the CSV files that rigs write, one run each.
+//!
+//! [`Recording`] reads row by row in bounded memory, as often as needed; [`Run`] holds a whole run by
+//! column; [`RecordingWriter`] writes one. Lines that start with `#` are comments, an empty cell or
+//! `nan` is missing, columns that the tool does not know are kept under their header.
+
+mod header;
+mod position;
+mod reader;
+mod run;
+mod utf8;
+mod writer;
+
+pub use header::{Channel, Header, Required};
+pub use reader::{Recording, Row, Rows};
+pub use run::Run;
+pub use writer::{RecordingWriter, push_exact};
