@@ -93,8 +93,9 @@ impl Candidate {
 }
 
 /// Ours.
-const OURS: [&str; 5] = [
+const OURS: [&str; 6] = [
     "article",
+    "article_checked",
     "article_report",
     "efficient",
     "slip_friction",
