@@ -5,10 +5,7 @@
     reason = "a failed step fails the test"
 )]
 
-use muslip::filter::mu_slip::{
-    Config, Covariance, Input, MuSlipFilter, Range, State, UpdateError, update_expecting,
-    update_reporting,
-};
+use muslip::filter::mu_slip::{Config, Covariance, Input, MuSlipFilter, Range, State, UpdateError};
 use muslip::filter::{Estimator, FrictionMeasurement};
 use muslip::law::Expansion;
 use muslip::real::Real;
@@ -272,7 +269,7 @@ fn null_is_exact<T: Real>() {
                             .update_expecting(&m.measurement(std), m.expected)
                             .unwrap();
                         let expected = without
-                            .update(&FrictionMeasurement {
+                            .update_reporting(&FrictionMeasurement {
                                 slip_ratio: point.slip_ratio,
                                 friction: point.friction,
                                 friction_std: std,
@@ -657,17 +654,27 @@ fn expecting_the_law_is_the_reporting_update_and_bad_expectations_are_named() {
             peak_friction: noise.uniform(0.1, 1.2) as f32,
             critical_slip: noise.uniform(0.05, 0.4) as f32,
         };
-        let covariance = Range::Automotive.initial_covariance();
         let slip = noise.uniform(-0.05, 1.05) as f32;
         let friction = noise.uniform(-0.2, 1.4) as f32;
         let law = state.law().unwrap().expansion(slip);
-        assert_eq!(
-            update_expecting(state, covariance, slip, law, friction, 0.01),
-            update_reporting(state, covariance, slip, friction, 0.01)
-        );
-        let named = Err(UpdateError::NonFinite(Input::Expected));
-        let mut filter = Config::<f32>::default().build().unwrap();
+        let measurement = FrictionMeasurement {
+            slip_ratio: slip,
+            friction,
+            friction_std: 0.04,
+        };
+        let mut filter = Config {
+            initial_state: state,
+            ..Config::for_range(Range::Automotive)
+        }
+        .build()
+        .unwrap();
         let before = filter;
+        let (mut expecting, mut reporting) = (filter, filter);
+        assert_eq!(
+            expecting.update_expecting(&measurement, law),
+            reporting.update_reporting(&measurement)
+        );
+        assert_eq!(expecting, reporting);
         for change in [
             |e: &mut Expansion<f32>| e.friction = f32::NAN,
             |e: &mut Expansion<f32>| e.by_peak_friction = f32::INFINITY,
@@ -677,13 +684,6 @@ fn expecting_the_law_is_the_reporting_update_and_bad_expectations_are_named() {
         ] {
             let mut broken = law;
             change(&mut broken);
-            let refused = update_expecting(state, covariance, slip, broken, friction, 0.01);
-            assert_eq!(refused, named);
-            let measurement = FrictionMeasurement {
-                slip_ratio: slip,
-                friction,
-                friction_std: 0.04,
-            };
             let refused = filter.update_expecting(&measurement, broken);
             assert_eq!(
                 refused.unwrap_err(),

@@ -117,7 +117,7 @@ impl<T: Real> PeakSeeker<T> {
     /// [`UpdateError`] of the two-state filter; the seeker is as it was before.
     pub fn step(&mut self, point: &FrictionMeasurement<T>) -> Result<T, UpdateError> {
         let mut filter = self.filter;
-        let fusion = filter.update(point)?;
+        let fusion = filter.update_reporting(point)?;
         let scaled = fusion.innovation / fusion.innovation_variance.sqrt();
         let weight = self.config.innovation_weight;
         let mean = self.mean_innovation + weight * (scaled - self.mean_innovation);
@@ -127,7 +127,7 @@ impl<T: Real> PeakSeeker<T> {
         if mean.abs() > self.config.change_threshold {
             let mut anew = self.filter;
             anew.restore(self.start)?;
-            anew.update(point)?;
+            anew.update_reporting(point)?;
             self.filter = anew;
             self.mean_innovation = T::ZERO;
             self.restarts = self.restarts.saturating_add(1);

@@ -83,8 +83,8 @@ impl Run {
         };
         let before = self.filter;
         let fusion = match &mut self.filter {
-            Filter::Article(filter) => filter.update(&measurement).ok(),
-            Filter::Efficient(filter) => filter.update(&measurement).ok(),
+            Filter::Article(filter) => filter.update_reporting(&measurement).ok(),
+            Filter::Efficient(filter) => filter.update_reporting(&measurement).ok(),
         };
         // A squared innovation that overflows makes no figure that is one.
         let sound = fusion.filter(|fusion| fusion.nis.is_finite());
@@ -155,7 +155,7 @@ mod tests {
             let friction = 0.3 + 0.01 * f64::from(step % 7);
             assert!(run.update(slip_ratio, friction, 0.04));
             let fusion = filter
-                .update(&FrictionMeasurement {
+                .update_reporting(&FrictionMeasurement {
                     slip_ratio,
                     friction,
                     friction_std: 0.04,

@@ -245,7 +245,7 @@ fn an_outlier_is_reported_as_rejected_and_changes_nothing_but_its_count() {
     let mut filter = Config::<f32>::default().build().unwrap();
     run(&mut filter, &points(0.35, 0.15, &slips, 5), SIGMA);
     let before = filter.peak();
-    let fusion = filter.update(&at(0.15, 1.5, SIGMA)).unwrap();
+    let fusion = filter.update_reporting(&at(0.15, 1.5, SIGMA)).unwrap();
     assert_eq!(fusion.decision, Decision::Rejected);
     assert!(fusion.nis > 16.0);
     assert_eq!(filter.peak(), before);

@@ -2,7 +2,7 @@
 #![allow(clippy::unwrap_used, reason = "a failed step fails the test")]
 
 use muslip::filter::mu_slip::{
-    Config, Covariance, CovarianceForm, Range, State, UpdateError, update,
+    Config, Covariance, CovarianceForm, Estimate, MuSlipFilter, Range, State, UpdateError,
 };
 use muslip::filter::{Decision, Estimator, FrictionMeasurement};
 use muslip::law::TyreLaw;
@@ -28,11 +28,13 @@ impl Tally {
     fn count(
         &mut self,
         prior: Covariance<f32>,
-        result: Result<(State<f32>, Covariance<f32>), UpdateError>,
+        filter: &MuSlipFilter<f32>,
+        result: Result<Decision, UpdateError>,
     ) {
         self.updates += 1;
         match result {
-            Ok((state, covariance)) => {
+            Ok(_) => {
+                let (state, covariance) = (filter.state(), filter.covariance());
                 let sound = state.is_finite() && is_positive_definite(covariance);
                 self.corrupted += u64::from(!sound);
                 let wider = covariance.p00 > prior.p00 || covariance.p11 > prior.p11;
@@ -41,6 +43,15 @@ impl Tally {
             Err(_) => self.refused += 1,
         }
     }
+}
+
+fn started(noise_inflation: f32, range: Range) -> MuSlipFilter<f32> {
+    Config {
+        noise_inflation,
+        ..Config::for_range(range)
+    }
+    .build()
+    .unwrap()
 }
 
 /// Updates from unrelated random estimates, up to nearly singular ones and nearly exact measurements.
@@ -65,11 +76,15 @@ fn unrelated(seed: u64, updates: u64) -> Tally {
         }
         let slip = noise.uniform(-0.05, 1.05) as f32;
         let friction = noise.uniform(-0.2, 1.4) as f32;
-        let variance = noise.log_uniform(1e-4, 0.5).powi(2) as f32;
-        tally.count(
-            covariance,
-            update(state, covariance, slip, friction, variance),
-        );
+        let friction_std = noise.log_uniform(1e-4, 0.5) as f32;
+        let mut filter = started(1.0, Range::Aircraft);
+        filter.restore(Estimate { state, covariance }).unwrap();
+        let result = filter.update(&FrictionMeasurement {
+            slip_ratio: slip,
+            friction,
+            friction_std,
+        });
+        tally.count(covariance, &filter, result);
     }
     tally
 }
@@ -85,7 +100,7 @@ fn runs(seed: u64, updates: u64) -> Tally {
         } else {
             Range::Automotive
         };
-        let (mut state, mut covariance) = (range.initial_state(), range.initial_covariance());
+        let mut filter = started(3.0, range);
         // Burckhardt's law where it rises from free rolling, else the Magic Formula.
         let (c1, c2, c3) = (
             noise.uniform(0.1, 1.3),
@@ -109,12 +124,13 @@ fn runs(seed: u64, updates: u64) -> Tally {
                 d * (c * (u - e * (u - u.atan())).atan()).sin()
             };
             let friction = law + noise.normal(std);
-            let variance = (9.0 * std * std) as f32;
-            let result = update(state, covariance, slip as f32, friction as f32, variance);
-            tally.count(covariance, result);
-            if let Ok(next) = result {
-                (state, covariance) = next;
-            }
+            let prior = filter.covariance();
+            let result = filter.update(&FrictionMeasurement {
+                slip_ratio: slip as f32,
+                friction: friction as f32,
+                friction_std: std as f32,
+            });
+            tally.count(prior, &filter, result);
         }
     }
     tally
@@ -143,12 +159,12 @@ fn covariance_stays_positive_definite_and_narrows_over_ten_million_updates() {
     assert_eq!(tally.refused, 0, "{tally:?}");
 }
 
-/// What a filter of that configuration holds after one measurement.
+/// What a filter of that configuration holds after one measurement, by the arithmetic in full.
 fn after(config: Config<f64>, slip_ratio: f64, friction: f64) -> (State<f64>, Covariance<f64>) {
     let mut filter = config.build().unwrap();
     let friction_std = 0.04;
     filter
-        .update(&FrictionMeasurement {
+        .update_reporting(&FrictionMeasurement {
             slip_ratio,
             friction,
             friction_std,
@@ -212,9 +228,12 @@ proptest! {
         let open = Config::default();
         let mut filter = open.build().unwrap();
         let measurement = FrictionMeasurement { slip_ratio: slip, friction, friction_std: 0.04 };
-        let nis = filter.update(&measurement).unwrap().nis;
+        let nis = filter.update_reporting(&measurement).unwrap().nis;
         let mut gated = Config { nis_gate: Some(gate), ..open }.build().unwrap();
-        let fusion = gated.update(&measurement).unwrap();
+        let mut quiet = gated;
+        let fusion = gated.update_reporting(&measurement).unwrap();
+        prop_assert_eq!(quiet.update(&measurement), Ok(fusion.decision));
+        prop_assert_eq!(quiet, gated);
         if nis > gate {
             prop_assert_eq!(fusion.decision, Decision::Rejected);
             prop_assert_eq!(fusion.signal_after, fusion.signal_before);

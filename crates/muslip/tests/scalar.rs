@@ -3,7 +3,8 @@
 mod dual;
 
 use dual::Dual;
-use muslip::filter::mu_slip::{Range, State, update};
+use muslip::filter::mu_slip::{Config, Range, update_reporting};
+use muslip::filter::{Estimator, FrictionMeasurement};
 use muslip::law::{Rudd, TyreLaw};
 use test_support::Tolerance;
 
@@ -27,26 +28,22 @@ fn the_slope_of_the_law_is_the_derivative_of_its_friction() {
 
 #[test]
 fn the_gain_is_the_derivative_of_the_updated_state_by_the_measured_friction() {
-    let (slip, friction, variance) = (0.1, 0.4, 0.0144);
-    let (x, p) = (
-        Range::Aircraft.initial_state::<Dual>(),
-        Range::Aircraft.initial_covariance::<Dual>(),
-    );
+    let (slip, friction, std) = (0.1, 0.4, 0.04);
     let constant = |v| Dual::of(v, 0.0);
-    let (updated, _): (State<Dual>, _) = update(
-        x,
-        p,
-        constant(slip),
-        Dual::of(friction, 1.0),
-        constant(variance),
-    )
-    .unwrap();
-    let (_, fusion) = muslip::filter::mu_slip::update_reporting(
+    let mut filter = Config::<Dual>::default().build().unwrap();
+    let measurement = FrictionMeasurement {
+        slip_ratio: constant(slip),
+        friction: Dual::of(friction, 1.0),
+        friction_std: constant(std),
+    };
+    filter.update(&measurement).unwrap();
+    let updated = filter.state();
+    let (_, fusion) = update_reporting(
         Range::Aircraft.initial_state(),
         Range::Aircraft.initial_covariance(),
         slip,
         friction,
-        variance,
+        (3.0 * std) * (3.0 * std),
     )
     .unwrap();
     NEAR.check(

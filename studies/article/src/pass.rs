@@ -64,7 +64,7 @@ pub(super) fn run(
     }
     .build()?;
     for (slip_ratio, &friction) in slips().into_iter().zip(frictions) {
-        let fusion = filter.update(&FrictionMeasurement {
+        let fusion = filter.update_reporting(&FrictionMeasurement {
             slip_ratio,
             friction,
             friction_std: FRICTION_STD,

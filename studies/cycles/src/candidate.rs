@@ -71,8 +71,9 @@ impl Candidate {
 }
 
 /// Ours.
-pub const OURS: [&str; 5] = [
+pub const OURS: [&str; 6] = [
     "article",
+    "article_checked",
     "article_report",
     "efficient",
     "slip_friction",

@@ -69,6 +69,10 @@ fn bars(rows: &[Row], candidate: &Candidate, cost: &Cost, percent: u64) -> Vec<S
             at_most("over nalgebra's", 0.65, cycles / cycles_of("nalgebra"), 2),
             at_most("over minikalman's", 0.4, cycles / cycles_of("minikalman"), 2),
         ],
+        "article_checked" => {
+            let lean = cycles_of("article");
+            vec![at_most("cycles over the lean update's", 1.3, cycles / lean, 3)]
+        }
         "efficient" => {
             let lean = cycles_of("article");
             vec![

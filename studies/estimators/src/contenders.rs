@@ -65,7 +65,7 @@ pub fn efficient_with_noise(
     let mut watch = Watch::over(stream.slips.len());
     for (&slip, &friction) in stream.slips.iter().zip(&stream.frictions) {
         let fusion = filter
-            .update(&FrictionMeasurement {
+            .update_reporting(&FrictionMeasurement {
                 slip_ratio: slip as f32,
                 friction: friction as f32,
                 friction_std: (declared * SIGMA) as f32,
@@ -115,7 +115,7 @@ pub fn article_run(truth: Curve, stream: &Stream) -> Outcome {
         .build()
         .unwrap();
     for (&slip_ratio, &friction) in stream.slips.iter().zip(&stream.frictions) {
-        let _ = filter.update(&FrictionMeasurement {
+        let _ = filter.update_reporting(&FrictionMeasurement {
             slip_ratio,
             friction,
             friction_std: SIGMA,

@@ -18,7 +18,7 @@ pub fn start() -> Memory {
 #[inline(never)]
 #[unsafe(no_mangle)]
 pub fn update(memory: &mut Memory, slip: f32, friction: f32) {
-    memory.last = Some(memory.filter.update(&FrictionMeasurement {
+    memory.last = Some(memory.filter.update_reporting(&FrictionMeasurement {
         slip_ratio: slip,
         friction,
         friction_std: 0.04,

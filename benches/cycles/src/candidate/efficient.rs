@@ -14,7 +14,7 @@ pub fn start() -> Memory {
 #[inline(never)]
 #[unsafe(no_mangle)]
 pub fn update(memory: &mut Memory, slip: f32, friction: f32) {
-    efficient::update(memory, slip, friction, VARIANCE);
+    efficient::update_unchecked(memory, slip, friction, VARIANCE);
 }
 
 pub fn answer(memory: &Memory) -> [f32; 2] {

@@ -4,6 +4,7 @@
 //! for it.
 
 #[cfg_attr(feature = "article", path = "article.rs")]
+#[cfg_attr(feature = "article_checked", path = "article_checked.rs")]
 #[cfg_attr(feature = "article_report", path = "article_report.rs")]
 #[cfg_attr(feature = "efficient", path = "efficient.rs")]
 #[cfg_attr(feature = "slip_friction", path = "slip_friction.rs")]

@@ -190,9 +190,9 @@ impl Filter {
             (Self::Article(filter), Some(expected)) => {
                 filter.update_expecting(&measured.measurement, expected)
             }
-            (Self::Article(filter), None) => filter.update(&measured.measurement),
+            (Self::Article(filter), None) => filter.update_reporting(&measured.measurement),
             // Without a low-pass filter on the force a compensated reading is the law at its slip.
-            (Self::Efficient(filter), _) => filter.update(&measured.measurement),
+            (Self::Efficient(filter), _) => filter.update_reporting(&measured.measurement),
         };
         // A squared innovation that overflows (a reading of 1e308, say) makes no figure that is one.
         match fusion {

@@ -9,7 +9,8 @@ pub mod mu_slip;
 
 use crate::real::Real;
 
-/// What every filter offers: one measurement in, what it did out, and the estimate as plain data.
+/// What every filter offers: one measurement in, and the estimate as plain data; what the measurement did, for
+/// who asks.
 ///
 /// ```
 /// use muslip::filter::{Estimator, FrictionMeasurement, mu_slip::{Config, Range}};
@@ -32,7 +33,7 @@ use crate::real::Real;
 pub trait Estimator<T: Real> {
     /// One measurement as this filter takes it.
     type Measurement;
-    /// What one measurement did.
+    /// What one measurement did, for who asks.
     type Fusion;
     /// State and covariance: plain data that can be copied, logged and restored.
     type Estimate: Copy;
@@ -43,7 +44,17 @@ pub trait Estimator<T: Real> {
     ///
     /// # Errors
     /// The filter's own; on any error the estimate is exactly as it was before the call.
-    fn update(&mut self, measurement: &Self::Measurement) -> Result<Self::Fusion, Self::Error>;
+    fn update(&mut self, measurement: &Self::Measurement) -> Result<Decision, Self::Error>;
+
+    /// Corrects the estimate with one measurement, and tells what it did: equal to [`Estimator::update`] but
+    /// for rounding, and dearer.
+    ///
+    /// # Errors
+    /// As for [`Estimator::update`].
+    fn update_reporting(
+        &mut self,
+        measurement: &Self::Measurement,
+    ) -> Result<Self::Fusion, Self::Error>;
 
     /// The present estimate.
     fn estimate(&self) -> Self::Estimate;

@@ -69,6 +69,18 @@ pub trait Real:
     /// True for numbers that are neither infinite nor NaN.
     fn is_finite(self) -> bool;
 
+    /// Zero where [`Real::is_finite`], NaN where not: added to one side of a comparison it refuses what is not
+    /// finite, for the price of a subtraction.
+    #[inline]
+    #[expect(clippy::eq_op, reason = "zero over zero is not a number")]
+    fn zero_if_finite(self) -> Self {
+        if self.is_finite() {
+            Self::ZERO
+        } else {
+            Self::ZERO / Self::ZERO
+        }
+    }
+
     /// The smaller of two; `other` where `self` is NaN.
     #[inline]
     fn min(self, other: Self) -> Self {
@@ -172,6 +184,11 @@ impl Real for f32 {
         libm::fabsf(self) <= f32::MAX
     }
     #[inline(always)]
+    #[expect(clippy::eq_op, reason = "an infinity less itself is not a number")]
+    fn zero_if_finite(self) -> Self {
+        self - self
+    }
+    #[inline(always)]
     fn quarter_binade(self) -> (usize, Self) {
         // Without its sign a number's upper bits are its exponent and the first two digits: quarters of
         // binades, counted from 2^-127.
@@ -233,6 +250,11 @@ impl Real for f64 {
     fn is_finite(self) -> bool {
         f64::is_finite(self)
     }
+    #[inline(always)]
+    #[expect(clippy::eq_op, reason = "an infinity less itself is not a number")]
+    fn zero_if_finite(self) -> Self {
+        self - self
+    }
 }
 
 #[cfg(test)]
@@ -264,6 +286,18 @@ mod tests {
             assert_eq!(index, (4.0 * (binade.log2() + 6.0) + quarter) as usize);
         }
         assert_eq!(f32::INFINITY.quarter_binade().0, 23);
+    }
+
+    #[test]
+    fn what_is_not_finite_is_not_zero() {
+        for finite in [0.0, -1.0, f32::MAX, f32::MIN_POSITIVE] {
+            assert_eq!(finite.zero_if_finite(), 0.0);
+            assert_eq!(f64::from(finite).zero_if_finite(), 0.0);
+        }
+        for bad in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
+            assert!(bad.zero_if_finite().is_nan());
+            assert!(f64::from(bad).zero_if_finite().is_nan());
+        }
     }
 
     #[test]

@@ -1,16 +1,14 @@
 use super::config::Config;
 use super::estimate::{Estimate, Expected};
 use crate::filter::mu_slip::{Covariance, Fusion, Input, State, UpdateError};
-use crate::filter::{Estimator, FrictionMeasurement, PeakEstimate};
+use crate::filter::{Decision, Estimator, FrictionMeasurement, PeakEstimate};
 use crate::real::Real;
 
-/// Corrects an estimate with one measured friction: the efficient estimator, lean.
-///
-/// `configuration` is of the filter that made the estimate. Inputs are not checked: for a slip, friction
-/// or variance that is not finite, or a variance that is not positive, the estimate is spoilt;
-/// [`EfficientFilter`] checks.
+/// One update without a check, for the cost table and the throughput example: a slip, friction or variance that
+/// is not finite, or a variance that is not positive, spoils the estimate, and nothing tells.
+#[doc(hidden)]
 #[inline]
-pub fn update<T: Real>(
+pub fn update_unchecked<T: Real>(
     filter: &mut EfficientFilter<T>,
     slip_ratio: T,
     friction: T,
@@ -79,14 +77,18 @@ impl<T: Real> Estimator<T> for EfficientFilter<T> {
     type Estimate = Estimate<T>;
     type Error = UpdateError;
 
-    /// Corrects the estimate with one measured friction, or rejects it at the gate.
-    ///
+    /// Corrects the estimate with one measured friction, or rejects it at the gate. That a squared innovation
+    /// must be finite takes the report, which is then thrown away.
+    fn update(&mut self, measurement: &FrictionMeasurement<T>) -> Result<Decision, UpdateError> {
+        Ok(self.update_reporting(measurement)?.decision)
+    }
+
     /// The innovation's variance is made with the noise as learnt. Gains are P Hᵀ/S with P before the
     /// update; the estimate itself moves by the likelihood's own step.
-    ///
-    /// # Errors
-    /// [`UpdateError`]; the estimate is exactly as it was before the call.
-    fn update(&mut self, measurement: &FrictionMeasurement<T>) -> Result<Fusion<T>, UpdateError> {
+    fn update_reporting(
+        &mut self,
+        measurement: &FrictionMeasurement<T>,
+    ) -> Result<Fusion<T>, UpdateError> {
         let FrictionMeasurement {
             slip_ratio,
             friction,

@@ -40,4 +40,4 @@ mod sums;
 
 pub use config::{Config, ConfigError, ConfigParameter};
 pub use estimate::Estimate;
-pub use filter::{EfficientFilter, update};
+pub use filter::{EfficientFilter, update_unchecked};

@@ -1,9 +1,9 @@
-use super::config::Config;
+use super::config::{Config, CovarianceForm};
 use super::error::{Input, UpdateError};
 use super::state::{Covariance, Estimate, State};
-use super::update::{Choices, Fusion, Inputs};
+use super::update::{Choices, Fusion, Inputs, lean};
 use crate::filter::{Decision, Estimator, FrictionMeasurement, PeakEstimate};
-use crate::law::{Expansion, expand};
+use crate::law::Expansion;
 use crate::real::Real;
 
 /// The filter: a validated configuration and the present estimate.
@@ -15,11 +15,26 @@ use crate::real::Real;
 pub struct MuSlipFilter<T> {
     config: Config<T>,
     estimate: Estimate<T>,
+    /// Inflated standard deviation from which an update is lean.
+    lean_above: T,
 }
 
 impl<T: Real> MuSlipFilter<T> {
     pub(super) fn new(config: Config<T>, estimate: Estimate<T>) -> Self {
-        Self { config, estimate }
+        let as_the_article = config.pseudonoise
+            && config.covariance_form == CovarianceForm::Short
+            && config.nis_gate.is_none();
+        Self {
+            config,
+            estimate,
+            lean_above: if as_the_article {
+                // Its square is a positive number of full precision.
+                T::EPSILON * T::EPSILON
+            } else {
+                // Above it a square is not finite, which is not sound.
+                T::ONE / T::MIN_POSITIVE
+            },
+        }
     }
 
     /// The configuration it was built from.
@@ -63,6 +78,16 @@ impl<T: Real> MuSlipFilter<T> {
             return Err(UpdateError::NonFinite(Input::Expected));
         }
         self.fuse(measurement, expected)
+    }
+
+    /// What an update does that is not lean, or that the lean arithmetic does not settle.
+    #[cold]
+    #[inline(never)]
+    fn update_in_full(
+        &mut self,
+        measurement: &FrictionMeasurement<T>,
+    ) -> Result<Decision, UpdateError> {
+        Ok(self.update_reporting(measurement)?.decision)
     }
 
     #[inline(always)]
@@ -114,14 +139,41 @@ impl<T: Real> Estimator<T> for MuSlipFilter<T> {
 
     /// Corrects the estimate with one measured friction, or rejects it at the gate.
     ///
-    /// # Errors
-    /// [`UpdateError`]; the estimate is exactly as it was before the call.
-    fn update(&mut self, measurement: &FrictionMeasurement<T>) -> Result<Fusion<T>, UpdateError> {
-        let State {
-            peak_friction,
-            critical_slip,
-        } = self.estimate.state;
-        let expected = expand(peak_friction, critical_slip, measurement.slip_ratio);
+    /// With the article's choices and no gate it is the lean arithmetic, one division, and all that may be wrong is
+    /// judged by what comes out; only what does not pass, or other choices, take the way in full, which finds out
+    /// why. See the [module](crate::filter::mu_slip) for what each check costs.
+    #[inline]
+    fn update(&mut self, measurement: &FrictionMeasurement<T>) -> Result<Decision, UpdateError> {
+        let FrictionMeasurement {
+            slip_ratio,
+            friction,
+            friction_std,
+        } = *measurement;
+        let inflated_std = self.config.noise_inflation * friction_std;
+        let Estimate { state, covariance } = self.estimate;
+        let step = lean(
+            state,
+            covariance,
+            slip_ratio,
+            friction,
+            inflated_std * inflated_std,
+        );
+        if inflated_std > self.lean_above && step.is_sound() {
+            self.estimate = Estimate {
+                state: step.state,
+                covariance: step.covariance,
+            };
+            Ok(Decision::Accepted)
+        } else {
+            self.update_in_full(measurement)
+        }
+    }
+
+    fn update_reporting(
+        &mut self,
+        measurement: &FrictionMeasurement<T>,
+    ) -> Result<Fusion<T>, UpdateError> {
+        let expected = self.estimate.state.expansion(measurement.slip_ratio);
         self.fuse(measurement, expected)
     }
 

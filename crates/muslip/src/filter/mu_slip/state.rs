@@ -179,12 +179,25 @@ impl<T: Real> Covariance<T> {
     #[inline(always)]
     pub(super) fn pivots(&self) -> (bool, T) {
         let product = self.p00 * self.p11;
-        let margin = T::ONE - T::from_f64(4.0) * T::EPSILON;
         // Added rather than compared: one comparison fewer in the loop of a controller. The product is
         // then positive, so P22 has the sign of P11.
-        let smallest = T::MIN_POSITIVE / T::EPSILON;
-        let definite = self.p00 > T::ZERO && self.p01 * self.p01 + smallest < product * margin;
-        (definite, product)
+        let least = self.p01 * self.p01 + Self::smallest_product();
+        (
+            self.p00 > T::ZERO && least < product * Self::margin(),
+            product,
+        )
+    }
+
+    /// P11 P22 below which it has lost digits.
+    #[inline(always)]
+    pub(super) fn smallest_product() -> T {
+        T::MIN_POSITIVE / T::EPSILON
+    }
+
+    /// Factor on P11 P22 that allows for the rounding of the determinant.
+    #[inline(always)]
+    pub(super) fn margin() -> T {
+        T::ONE - T::from_f64(4.0) * T::EPSILON
     }
 }
 

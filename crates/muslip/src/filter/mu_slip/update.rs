@@ -1,4 +1,4 @@
-//! The arithmetic of one update, once, and the two free functions that use it.
+//! The arithmetic of one update: in full, with what is told of it, and lean.
 
 use super::config::CovarianceForm;
 use super::error::{Input, UpdateError};
@@ -95,7 +95,7 @@ impl<T: Real> Inputs<T> {
         }
     }
 
-    /// The equations of the module, unrolled. Two divisions, no calls.
+    /// The equations of the module, unrolled, with all that is told of them. Two divisions, no calls.
     #[inline(always)]
     pub(super) fn step(&self, choices: Choices) -> Step<T> {
         let State {
@@ -218,53 +218,20 @@ impl<T: Real> Inputs<T> {
     }
 }
 
-/// Corrects state and covariance with one measured friction: the article's filter, lean.
-///
-/// | argument | symbol | unit | valid range |
-/// |---|---|---|---|
-/// | `state` | x = (mup, sp) | - | finite |
-/// | `covariance` | P, 2×2 | - | positive definite |
-/// | `slip_ratio` | s | - | finite; 0..=1 is meant |
-/// | `friction` | z | - | finite |
-/// | `measurement_variance` | (n σ)² | - | > 0; inflation included, pseudonoise not |
-///
-/// Equations: see the [module](crate::filter::mu_slip). Covariance: short form. Innovation is measured minus
-/// predicted. Cost: two divisions, no loops, no calls.
-///
-/// # Errors
-/// [`UpdateError`]; nothing is changed, as state and covariance are the caller's.
-///
-/// ```
-/// use muslip::filter::mu_slip::{Range, update};
-///
-/// let (mut x, mut p) = (Range::Aircraft.initial_state(), Range::Aircraft.initial_covariance());
-/// let variance = (3.0_f32 * 0.04) * (3.0 * 0.04);
-/// for (slip, friction) in [(0.05, 0.21), (0.10, 0.32), (0.15, 0.35), (0.30, 0.28)] {
-///     (x, p) = update(x, p, slip, friction, variance)?;
-/// }
-/// assert!((x.peak_friction - 0.35).abs() < 2.0 * p.peak_friction_std());
-/// # Ok::<(), muslip::filter::mu_slip::UpdateError>(())
-/// ```
-#[inline]
-pub fn update<T: Real>(
-    state: State<T>,
-    covariance: Covariance<T>,
-    slip_ratio: T,
-    friction: T,
-    measurement_variance: T,
-) -> Result<(State<T>, Covariance<T>), UpdateError> {
-    let inputs = Inputs::of_the_law(
-        state,
-        covariance,
-        slip_ratio,
-        friction,
-        measurement_variance,
-    );
-    let step = inputs.judged(inputs.step(ARTICLE))?;
-    Ok((step.state, step.covariance))
+/// One update by [`lean`], computed but not yet judged.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Lean<T> {
+    pub state: State<T>,
+    pub covariance: Covariance<T>,
+    /// P11' S d⁶.
+    positive: T,
+    /// P12'² and the smallest product; NaN where a state or P11' S d⁶ is not finite.
+    least_product: T,
+    /// P11' P22' less its rounding.
+    safe_product: T,
 }
 
-/// [`update`] with one division and without a check, for the loop of a controller that checks its inputs.
+/// The article's choices with one division.
 ///
 /// All is scaled by powers of d = s² + sp², so that only the variance of the innovation is divided by:
 /// with h = d² H, ½ d³ ∂²mu/∂sp² = c and b = d² ∂²mu/∂mup∂sp
@@ -273,9 +240,124 @@ pub fn update<T: Real>(
 /// S d⁶ = d² (h P hᵀ + b² P11 P22 + (n σ)² d⁴) + (c P22)²
 /// ```
 ///
-/// Equal to [`update`] but for rounding. In `f32` S d⁶ keeps its precision for s or sp above 1e-4.
-/// Arguments and ranges are those of [`update`]; what is outside them spoils the result, and nothing
-/// tells.
+/// Equal to [`Inputs::step`] but for rounding, as long as S d⁶ is a number of full precision: in `f32` for s or sp
+/// above some 0.01. Below, the step in full takes over.
+#[inline(always)]
+pub(super) fn lean<T: Real>(
+    state: State<T>,
+    covariance: Covariance<T>,
+    slip_ratio: T,
+    friction: T,
+    measurement_variance: T,
+) -> Lean<T> {
+    let State {
+        peak_friction: mup,
+        critical_slip: sp,
+    } = state;
+    let Covariance { p00, p01, p11 } = covariance;
+    let least = Covariance::<T>::smallest_product();
+    let margin = Covariance::<T>::margin();
+    // The order of the lines is the compiler's order, near enough: few results are used by the next
+    // instruction, which on a Cortex-M4F costs a cycle each time (docs/design/0006).
+    let ss = slip_ratio * slip_ratio;
+    let twice = slip_ratio + slip_ratio;
+    let pp = sp * sp;
+    let difference = ss - pp;
+    let b = twice * difference;
+    let h1 = mup * b;
+    let d = pp + ss;
+    let twice_difference = difference + difference;
+    let p01_h1 = h1 * p01;
+    let b_p11 = b * p11;
+    let arm = twice * sp;
+    let h0 = d * arm;
+    let p00_h0 = p00 * h0;
+    let dd = d * d;
+    let predicted = mup * h0;
+    let p11_h1 = p11 * h1;
+    let scaled_friction = friction * dd;
+    let innovation = scaled_friction - predicted;
+    // sp² - 3 s² = -(d + 2 (s² - sp²)), and its sign is squared away.
+    let bend = d + twice_difference;
+    let dddd = dd * dd;
+    let arm_bend = arm * bend;
+    let b_p00 = b * p00;
+    let both = b_p00 * b_p11;
+    let c = arm_bend * mup;
+    let p01_h0 = h0 * p01;
+    let g1 = p11_h1 + p01_h0;
+    let signal_1 = g1 * h1;
+    let g0 = p01_h1 + p00_h0;
+    let signal_and_both = signal_1 + both;
+    let signal_0 = h0 * g0;
+    let signal_and_pseudonoise = signal_and_both + signal_0;
+    let noise = measurement_variance * dddd;
+    let variance = signal_and_pseudonoise + noise;
+    let scaled_variance = dd * variance;
+    let cp = c * p11;
+    let cp_cp = cp * cp;
+    let scaled = scaled_variance + cp_cp;
+    let gain = dd / scaled;
+    let k1 = gain * g1;
+    let k0 = g0 * gain;
+    let less_01 = g1 * k0;
+    let less_11 = k1 * g1;
+    let next_p11 = p11 - less_11;
+    let less_00 = k0 * g0;
+    let next_p00 = p00 - less_00;
+    let product = next_p00 * next_p11;
+    let move_0 = innovation * k0;
+    let next_p01 = p01 - less_01;
+    let move_1 = k1 * innovation;
+    let square = next_p01 * next_p01;
+    let above_square = square + least;
+    let next_mup = mup + move_0;
+    let positive = next_p00 * scaled;
+    let next_sp = sp + move_1;
+    let states = next_mup + next_sp;
+    let all = states + positive;
+    let zero = all.zero_if_finite();
+    let least_product = above_square + zero;
+    let safe_product = product * margin;
+    Lean {
+        state: State {
+            peak_friction: next_mup,
+            critical_slip: next_sp,
+        },
+        covariance: Covariance {
+            p00: next_p00,
+            p01: next_p01,
+            p11: next_p11,
+        },
+        positive,
+        least_product,
+        safe_product,
+    }
+}
+
+impl<T: Real> Lean<T> {
+    /// Whether it may be kept, of a prior that might be and a noise that is a positive number.
+    ///
+    /// What is not sound may still be so by [`Inputs::step`], which scales nothing. What is sound is so there, but for
+    /// rounding: of a prior that is finite and positive definite
+    ///
+    /// | what is refused | where it shows |
+    /// |---|---|
+    /// | slip or noise not finite, or so large that a power of d overflows | S d⁶ is not finite |
+    /// | friction not finite, a state that overflows | a state is not finite |
+    /// | S not positive, or S d⁶ so small that it has lost digits | P11' S d⁶ is not above the smallest: with S < 0 variances grow, so that the two are never negative at once |
+    /// | P11' not positive | the same, as S is |
+    /// | P' not positive definite | as in [`Covariance::is_positive_definite`]; P11' P22' is finite as variances do not grow |
+    #[inline(always)]
+    pub(super) fn is_sound(&self) -> bool {
+        self.least_product < self.safe_product
+            && self.positive > Covariance::<T>::smallest_product()
+    }
+}
+
+/// One update by the lean arithmetic without a check, for the cost table and the throughput example: what is
+/// outside the ranges of [`Inputs`] spoils the result, and nothing tells.
+#[doc(hidden)]
 #[inline]
 #[must_use]
 pub fn update_unchecked<T: Real>(
@@ -285,68 +367,24 @@ pub fn update_unchecked<T: Real>(
     friction: T,
     measurement_variance: T,
 ) -> (State<T>, Covariance<T>) {
-    let State {
-        peak_friction: mup,
-        critical_slip: sp,
-    } = state;
-    let Covariance { p00, p01, p11 } = covariance;
-    // The order of the lines is the compiler's order, near enough: no result is used by the next
-    // instruction, which on a Cortex-M4F costs a cycle each time (docs/design/0006). The law first.
-    let ss = slip_ratio * slip_ratio;
-    let twice = slip_ratio + slip_ratio;
-    let arm = twice * sp;
-    let pp = sp * sp;
-    let difference = ss - pp;
-    let twice_difference = difference + difference;
-    let b = twice * difference;
-    let h1 = mup * b;
-    let p01_h1 = h1 * p01;
-    let d = pp + ss;
-    let h0 = d * arm;
-    let b_p00 = b * p00;
-    let p01_h0 = h0 * p01;
-    let dd = d * d;
-    let p00_h0 = p00 * h0;
-    let scaled_friction = friction * dd;
-    let p11_h1 = p11 * h1;
-    let b_p11 = b * p11;
-    let both = b_p00 * b_p11;
-    let predicted = mup * h0;
-    // sp² - 3 s² = -(d + 2 (s² - sp²)), and its sign is squared away.
-    let bend = d + twice_difference;
-    let arm_bend = arm * bend;
-    let c = arm_bend * mup;
-    let g1 = p11_h1 + p01_h0;
-    let g0 = p01_h1 + p00_h0;
-    let signal_0 = h0 * g0;
-    let dddd = dd * dd;
-    let noise = measurement_variance * dddd;
-    let signal_1 = g1 * h1;
-    let innovation = scaled_friction - predicted;
-    let cp = c * p11;
-    let scaled = dd * (((signal_1 + both) + signal_0) + noise) + cp * cp;
-    let gain = dd / scaled;
-    let (k1, k0) = (gain * g1, g0 * gain);
-    let move_1 = k1 * innovation;
-    let (less_01, less_11, less_00) = (g1 * k0, k1 * g1, k0 * g0);
-    let move_0 = innovation * k0;
-    (
-        State {
-            peak_friction: mup + move_0,
-            critical_slip: sp + move_1,
-        },
-        Covariance {
-            p00: p00 - less_00,
-            p01: p01 - less_01,
-            p11: p11 - less_11,
-        },
-    )
+    let lean = lean(
+        state,
+        covariance,
+        slip_ratio,
+        friction,
+        measurement_variance,
+    );
+    (lean.state, lean.covariance)
 }
 
-/// [`update`], bit for bit, with what it did.
+/// One update of any state and covariance, with what it did, for the study of the article and the tests: a
+/// filter checks its start when it is built, this checks it at every call.
+///
+/// `measurement_variance` is (n σ)², > 0: inflation included, pseudonoise not.
 ///
 /// # Errors
-/// As for [`update`].
+/// [`UpdateError`]; nothing is changed, as state and covariance are the caller's.
+#[doc(hidden)]
 #[inline]
 pub fn update_reporting<T: Real>(
     state: State<T>,
@@ -362,42 +400,6 @@ pub fn update_reporting<T: Real>(
         friction,
         measurement_variance,
     );
-    let step = inputs.judged(inputs.step(ARTICLE))?;
-    let estimate = Estimate {
-        state: step.state,
-        covariance: step.covariance,
-    };
-    Ok((estimate, step.fusion))
-}
-
-/// [`update_reporting`] of a measurement that does not read the law at its slip but something made of it
-/// (behind a low-pass filter, say), which `expected` predicts at the prior state.
-///
-/// `slip_ratio` is reported and not computed with. With [`Rudd::expansion`](crate::law::Rudd::expansion)
-/// of the prior state it is [`update_reporting`], bit for bit.
-///
-/// # Errors
-/// As for [`update`]; [`UpdateError::NonFinite`] of [`Input::Expected`] if `expected` is not finite.
-#[inline]
-pub fn update_expecting<T: Real>(
-    state: State<T>,
-    covariance: Covariance<T>,
-    slip_ratio: T,
-    expected: Expansion<T>,
-    friction: T,
-    measurement_variance: T,
-) -> Result<(Estimate<T>, Fusion<T>), UpdateError> {
-    if !expected.is_finite() {
-        return Err(UpdateError::NonFinite(Input::Expected));
-    }
-    let inputs = Inputs {
-        state,
-        covariance,
-        slip_ratio,
-        expected,
-        friction,
-        measurement_variance,
-    };
     let step = inputs.judged(inputs.step(ARTICLE))?;
     let estimate = Estimate {
         state: step.state,
