@@ -12,6 +12,7 @@ mod setup;
 mod step;
 mod test;
 mod trial;
+mod what_if;
 
 use clap::{Parser, Subcommand};
 
@@ -73,6 +74,12 @@ enum Command {
     },
     /// Write the field guide, docs/mechanisms.md with its pictures, from what the mechanisms say of themselves.
     Mechanisms,
+    /// Compile the core to WebAssembly for the pages' what-if, into crates/muslip-report/what-if.
+    WhatIf {
+        /// Only hold the committed module against its sources, as the tests do.
+        #[arg(long)]
+        check: bool,
+    },
     /// Build, check, and put the image onto a chip by probe-rs.
     Flash,
     /// The sealed trial of the diagnosis: conceal effects, diagnose, open, judge, hold against bars.
@@ -115,6 +122,8 @@ fn main() -> anyhow::Result<()> {
             python,
         } => estimators::run_all(streams, write, python.as_deref()),
         Command::Mechanisms => mechanisms::write(),
+        Command::WhatIf { check: true } => what_if::check(),
+        Command::WhatIf { check: false } => what_if::write(),
         Command::Flash => firmware::flash(),
         Command::Trial { arguments } => trial::play(&arguments),
     }

@@ -57,6 +57,11 @@ pub fn for_cycles() -> Result<()> {
     Machine::this().set_up(CYCLES_TOOLS)
 }
 
+/// As [`run_all`], for `cargo xtask what-if`.
+pub fn for_what_if() -> Result<()> {
+    Machine::this().set_up(&[])
+}
+
 /// Installs what is missing, or says exactly what to install.
 pub fn run_all() -> Result<()> {
     Machine::this().set_up(TOOLS)

@@ -11,6 +11,12 @@ pub fn root() -> PathBuf {
     PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/.."))
 }
 
+/// The folder that cargo builds into.
+pub fn target() -> PathBuf {
+    std::env::var_os("CARGO_TARGET_DIR")
+        .map_or_else(|| root().join("target"), |folder| root().join(folder))
+}
+
 /// `cargo` with these arguments, in the root, without standard input.
 pub fn cargo(arguments: &[&str]) -> Command {
     // The cargo that runs this, so that a `+toolchain` carries over.

@@ -10,6 +10,7 @@ use crate::firmware;
 use crate::setup::{self, TARGETS};
 use crate::step::{cargo, run, step};
 use crate::trial;
+use crate::what_if;
 
 /// Packages whose `#[ignore]`d tests are long rather than broken: run in release.
 const LONG_TESTS: &[&str] = &["muslip", "host-tests", "study-quarter-car"];
@@ -39,6 +40,8 @@ struct Tally {
 /// A failing test does not stop the others; a build that fails does.
 pub fn run_all() -> Result<()> {
     setup::run_all()?;
+
+    what_if::check()?;
 
     let workspace = tests(
         "tests of the workspace",

@@ -5,7 +5,7 @@ use std::process::Command;
 
 use anyhow::{Context, Result, bail};
 
-use crate::step::{cargo, command, root, run};
+use crate::step::{cargo, command, run, target};
 
 /// The engine that later ones are held against, by its commit.
 const RIVAL: &str = "6b77987";
@@ -65,11 +65,6 @@ pub fn play(arguments: &[String]) -> Result<()> {
 /// The small trial: continuous integration's seed, figures held by a ratchet.
 pub fn small() -> Result<()> {
     play(&["--small".into()])
-}
-
-fn target() -> PathBuf {
-    std::env::var_os("CARGO_TARGET_DIR")
-        .map_or_else(|| root().join("target"), |folder| root().join(folder))
 }
 
 fn program(target: &std::path::Path, name: &str) -> String {

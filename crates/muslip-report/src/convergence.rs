@@ -11,8 +11,8 @@ use super::axis::{Axis, Extent};
 use super::figure::{Figure, Ink, Live, Shape, ellipse};
 use super::spec::rounded;
 
-/// The core as WebAssembly, in base64; empty where the toolchain could not build it.
-const CORE: &str = include_str!(concat!(env!("OUT_DIR"), "/muslip_wasm.base64"));
+/// The core as WebAssembly: `cargo xtask what-if`.
+const CORE: &[u8] = include_bytes!("../what-if/muslip_wasm.wasm");
 
 /// A run.
 #[derive(Debug, Clone, PartialEq)]
@@ -218,20 +218,13 @@ impl Convergence {
     }
 
     /// The core to run again with, where the page can.
-    pub(super) fn core(&self) -> Option<&'static str> {
-        (self.again.is_some() && !CORE.is_empty()).then_some(CORE)
+    pub(super) fn core(&self) -> Option<&'static [u8]> {
+        self.again.is_some().then_some(CORE)
     }
 
     /// What to say where the page cannot run the filter again.
     pub(super) fn without_what_if(&self) -> Option<&str> {
-        match (self.again, CORE.is_empty()) {
-            (None, _) => Some(&self.about_what_if),
-            (Some(_), true) => Some(
-                "This page cannot run the filter again under other assumptions: the command that made it was \
-                 built without the target wasm32-unknown-unknown.",
-            ),
-            (Some(_), false) => None,
-        }
+        self.again.is_none().then_some(&self.about_what_if)
     }
 
     /// The page's data.

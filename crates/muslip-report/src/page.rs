@@ -205,7 +205,7 @@ struct WhatIf<'a> {
 struct PageData {
     figures: Vec<Value>,
     convergence: Option<Value>,
-    core: Option<&'static str>,
+    core: Option<&'static [u8]>,
     sortable: bool,
 }
 
@@ -300,7 +300,7 @@ impl PageData {
             blocks.push(("convergence", JSON, in_script(convergence)));
         }
         if let Some(core) = self.core {
-            blocks.push(("core", "application/wasm-base64", core.to_owned()));
+            blocks.push(("core", "application/wasm-base64", BASE64.encode(core)));
         }
         blocks
     }

@@ -1,6 +1,6 @@
 //! The filters of the core crate as a page of the host runs them: one run at a time, numbers in, numbers out.
 //!
-//! Compiled to WebAssembly by the build script of `muslip-report` and carried in every page of an estimate, so
+//! Compiled to WebAssembly by `cargo xtask what-if` and carried in every page of an estimate, so
 //! that the reader's own assumptions go through the code that the rig runs. On other targets it is a plain
 //! library, which the tests hold against `muslip estimate`.
 
