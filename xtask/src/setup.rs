@@ -67,6 +67,12 @@ pub fn run_all() -> Result<()> {
     Machine::this().set_up(TOOLS)
 }
 
+/// As [`run`], with all that the command prints on standard error: a set-up is no result.
+fn set_up_step(name: &str, mut command: Command) -> Result<()> {
+    command.stdout(std::io::stderr());
+    run(name, command)
+}
+
 /// A machine, as far as it is found along a search path.
 struct Machine {
     path: OsString,
@@ -109,7 +115,7 @@ impl Machine {
         }
         let mut install = self.command("rustup", &["target", "add"]);
         install.args(&missing);
-        run(&format!("install {}", missing.join(", ")), install)
+        set_up_step(&format!("install {}", missing.join(", ")), install)
     }
 
     fn tools(&self, wanted: &[Tool]) -> Result<()> {
@@ -132,7 +138,7 @@ impl Machine {
                 reasons.join(", ")
             );
         }
-        run(
+        set_up_step(
             "update package lists",
             self.command("apt-get", &["update", "-q"]),
         )?;
@@ -143,7 +149,7 @@ impl Machine {
         install
             .args(packages.split(' '))
             .env("DEBIAN_FRONTEND", "noninteractive");
-        run(&format!("install {packages}"), install)
+        set_up_step(&format!("install {packages}"), install)
             .with_context(|| format!("install by hand: {packages}"))?;
         match missing.iter().find(|tool| !self.has(tool.program)) {
             None => Ok(()),

@@ -36,13 +36,13 @@ pub fn command(program: &str, arguments: &[&str]) -> Command {
     command
 }
 
-/// Does `work` under a heading and says how long it took.
+/// Does `work` under a heading and says how long it took: on standard error, for standard output holds results.
 pub fn step<T>(name: &str, work: impl FnOnce() -> Result<T>) -> Result<T> {
-    println!("==> {name}");
+    eprintln!("==> {name}");
     let start = Instant::now();
     let result = work();
     let outcome = if result.is_ok() { "done" } else { "FAILED" };
-    println!(
+    eprintln!(
         "==> {name}: {outcome} in {:.1} s",
         start.elapsed().as_secs_f64()
     );

@@ -90,6 +90,9 @@ mod tests {
     fn a_module_that_differs_is_told_with_what_to_run() {
         assert!(same(b"\0asm", b"\0asm").is_ok());
         let told = same(b"\0asm", b"\0asm\x01").unwrap_err().to_string();
-        assert!(told.contains("run `cargo xtask what-if` and commit"), "{told}");
+        assert!(
+            told.contains("run `cargo xtask what-if` and commit"),
+            "{told}"
+        );
     }
 }
