@@ -8,6 +8,7 @@ mod figures;
 mod firmware;
 mod image;
 mod mechanisms;
+mod release;
 mod setup;
 mod step;
 mod test;
@@ -80,6 +81,12 @@ enum Command {
         #[arg(long)]
         check: bool,
     },
+    /// Whether the crates could be released: what they say of themselves, their dependencies, their packages.
+    Release {
+        /// Required: only this is done here; to upload is `cargo publish --workspace`, by who owns the names.
+        #[arg(long, required = true)]
+        dry_run: bool,
+    },
     /// Build, check, and put the image onto a chip by probe-rs.
     Flash,
     /// The sealed trial of the diagnosis: conceal effects, diagnose, open, judge, hold against bars.
@@ -124,6 +131,7 @@ fn main() -> anyhow::Result<()> {
         Command::Mechanisms => mechanisms::write(),
         Command::WhatIf { check: true } => what_if::check(),
         Command::WhatIf { check: false } => what_if::write(),
+        Command::Release { .. } => release::dry_run(),
         Command::Flash => firmware::flash(),
         Command::Trial { arguments } => trial::play(&arguments),
     }

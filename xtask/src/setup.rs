@@ -1,11 +1,12 @@
 //! What the tests need beyond a Rust toolchain: rustup targets and system packages.
 
 use std::ffi::OsString;
+use std::path::PathBuf;
 use std::process::Command;
 
 use anyhow::{Context, Result, bail};
 
-use crate::step::{command, run};
+use crate::step::{cargo, command, run, target};
 
 /// Targets that the core is built for.
 pub const TARGETS: [&str; 3] = [
@@ -13,6 +14,9 @@ pub const TARGETS: [&str; 3] = [
     "thumbv6m-none-eabi",
     "wasm32-unknown-unknown",
 ];
+
+/// The version of cargo-deny that `deny.toml` is written for.
+const CARGO_DENY: &str = "0.20.2";
 
 /// A program from a system package.
 struct Tool {
@@ -65,6 +69,22 @@ pub fn for_what_if() -> Result<()> {
 /// Installs what is missing, or says exactly what to install.
 pub fn run_all() -> Result<()> {
     Machine::this().set_up(TOOLS)
+}
+
+/// The program cargo-deny, built below the target folder where it is not there yet: takes some minutes.
+pub fn cargo_deny() -> Result<PathBuf> {
+    let folder = target()
+        .join("tools")
+        .join(format!("cargo-deny-{CARGO_DENY}"));
+    let program = folder.join(format!("bin/cargo-deny{}", std::env::consts::EXE_SUFFIX));
+    if !program.exists() {
+        let mut install = cargo(&["install", "--locked", "--quiet", "--root"]);
+        install
+            .arg(&folder)
+            .args(["--version", CARGO_DENY, "cargo-deny"]);
+        set_up_step(&format!("build cargo-deny {CARGO_DENY}"), install)?;
+    }
+    Ok(program)
 }
 
 /// As [`run`], with all that the command prints on standard error: a set-up is no result.
