@@ -7,7 +7,6 @@ use muslip::real::Real;
 use muslip::sample::SampleLimits;
 
 use crate::evidence::Evidence;
-use crate::monitor::Monitor;
 
 /// Wheel and vehicle.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -109,7 +108,7 @@ pub struct Forming<T> {
     pub gate_stds: T,
 }
 
-/// Everything that the balances need to know. `build` it into a [`Monitor`].
+/// Everything that the balances need to know. `build` it into a [`Monitor`](crate::Monitor).
 ///
 /// Sizes of noise are not fitted here, as a diagnosis of recordings does: false alarms are as stated only where
 /// they are as stated. Too large they make the monitor blind, too small they raise alarms.
@@ -287,16 +286,7 @@ impl<T: Real> Settings<T> {
         }
     }
 
-    /// The monitor, before its first step.
-    ///
-    /// # Errors
-    /// [`SettingsError::OutOfRange`] naming the first setting outside its range.
-    pub fn build(self) -> Result<Monitor<T>, SettingsError> {
-        self.check().map_err(SettingsError::OutOfRange)?;
-        Monitor::new(self).map_err(SettingsError::OutOfRange)
-    }
-
-    fn check(&self) -> Result<(), Setting> {
+    pub(crate) fn check(&self) -> Result<(), Setting> {
         let positive = |x: T| x > T::ZERO && x.is_finite();
         let limits = &self.forming.sample;
         let checks = [
