@@ -4,7 +4,7 @@ use super::effect::{
     EffectiveRadius, ForceDelay, ForceLag, LoadCrosstalk, LoadSensitivity, Relaxation,
     SpeedSensitivity, ThermalFade, ZeroDrift,
 };
-use super::error::Figure;
+use super::error::Parameter;
 
 /// Which effects to compensate, each with its figures.
 ///
@@ -54,9 +54,9 @@ impl<T: Real> Compensation<T> {
         }
     }
 
-    pub(super) fn check(&self, declared_radius_m: T) -> Result<(), Figure> {
+    pub(super) fn check(&self, declared_radius_m: T) -> Result<(), Parameter> {
         if !(declared_radius_m > T::ZERO && declared_radius_m.is_finite()) {
-            return Err(Figure::DeclaredRadius);
+            return Err(Parameter::DeclaredRadius);
         }
         self.effective_radius.map_or(Ok(()), |e| e.check())?;
         self.force_delay.map_or(Ok(()), |e| e.check())?;
@@ -69,7 +69,7 @@ impl<T: Real> Compensation<T> {
         self.thermal_fade.map_or(Ok(()), |e| e.check())?;
         match self.longest_step_s {
             Some(step) if step > T::ZERO => Ok(()),
-            Some(_) => Err(Figure::LongestStep),
+            Some(_) => Err(Parameter::LongestStep),
             None => Ok(()),
         }
     }

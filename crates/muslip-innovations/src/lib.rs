@@ -58,7 +58,7 @@
 //!
 //! # How often it is wrong
 //!
-//! A window is inconsistent with [`Evidence::false_alarm_probability`](evidence::Evidence::false_alarm_probability)
+//! A window is inconsistent with [`Detection::false_alarm_probability`](detection::Detection::false_alarm_probability)
 //! at most, under the right model with noise of the stated sizes; 1e-6 unless said otherwise, or one false alarm in 21
 //! hours or more of all balances formed at 1 kHz. Over simulated stops, with the probability raised so that there is something to
 //! count, alarms are as many as stated (`cargo test -p muslip-innovations --test verdicts -- --nocapture` prints them).
@@ -125,7 +125,7 @@
     )
 )]
 
-pub mod evidence;
+pub mod detection;
 mod level;
 pub mod monitor;
 pub mod reading;

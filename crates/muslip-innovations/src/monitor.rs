@@ -3,7 +3,7 @@
 use muslip::law::Rudd;
 use muslip::real::Real;
 
-use crate::evidence::{Band, BandLimits, Bands, Figures, Limits, Window};
+use crate::detection::{Band, BandLimits, Bands, Figures, Limits, Window};
 use crate::level::{Level, Noise, Rate, Step};
 use crate::reading::{Reading, StepError};
 use crate::settings::{Coloured, Setting, Settings, SettingsError};
@@ -98,7 +98,7 @@ impl<T: Real> Monitor<T> {
     fn new(settings: Settings<T>) -> Result<Self, Setting> {
         Ok(Self {
             balances: Balances::new(&settings)?,
-            limits: BandLimits::new(&settings.evidence),
+            limits: BandLimits::new(&settings.detection),
             settings,
             tyre: Bands::empty(),
             wheel: Bands::empty(),

@@ -6,7 +6,7 @@ use muslip::law::Rudd;
 use muslip::real::Real;
 use muslip::sample::SampleLimits;
 
-use crate::evidence::Evidence;
+use crate::detection::Detection;
 
 /// Wheel and vehicle.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -125,7 +125,7 @@ pub struct Settings<T> {
     /// When a balance is formed.
     pub forming: Forming<T>,
     /// How the evidence is weighed.
-    pub evidence: Evidence<T>,
+    pub detection: Detection<T>,
 }
 
 /// A setting, or a group of settings that are checked alike.
@@ -152,8 +152,8 @@ pub enum Setting {
     LongestStep,
     /// [`Forming::gate_stds`].
     Gate,
-    /// [`Evidence`].
-    Evidence,
+    /// [`Detection`].
+    Detection,
 }
 
 /// Settings of which no monitor can be made.
@@ -177,7 +177,7 @@ impl fmt::Display for Setting {
             Self::Limits => "limits of a sample",
             Self::LongestStep => "longest step",
             Self::Gate => "gate",
-            Self::Evidence => "window or probability of the evidence",
+            Self::Detection => "window or probability of the detection",
         })
     }
 }
@@ -282,7 +282,7 @@ impl<T: Real> Settings<T> {
             sensors,
             unmodelled: Unmodelled::usual(&rig, &sensors, largest_drag_n),
             forming: Forming::usual(T::from_f64(0.02) * largest_drag_n),
-            evidence: Evidence::usual(),
+            detection: Detection::usual(),
         }
     }
 
@@ -317,7 +317,7 @@ impl<T: Real> Settings<T> {
                     && self.forming.gate_stds <= T::from_f64(100.0),
                 Setting::Gate,
             ),
-            (self.evidence.in_range(), Setting::Evidence),
+            (self.detection.in_range(), Setting::Detection),
         ];
         match checks.iter().find(|(in_range, _)| !in_range) {
             Some((_, setting)) => Err(*setting),
