@@ -17,7 +17,7 @@
 //! noise     Σ parts: Ornstein-Uhlenbeck times a gain, constants of a run, a walk,
 //!           both integrated into the walk                                        whitener::Kind
 //! filter    y = z − h x,  s = h P hᵀ + r,  ν = y/√s;  P = U D Uᵀ                  whitener::Whitener
-//! evidence  Σ ν²/n against χ², Σ ν ν₋₁/n against its quantile, window by window   evidence
+//! evidence  Σ ν²/n against χ², Σ ν ν₋₁/n against its quantile, window by window   detection
 //!           fast: each ν, 256 a window; slow: sums over 32, 64 a window
 //! verdict   NotFormed, Consistent, Inconsistent { balance, band }                monitor::Verdict
 //! settings  rig, law, noise of the sensors, what the right model may leave out    settings::Settings
