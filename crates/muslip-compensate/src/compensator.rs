@@ -7,7 +7,7 @@ use muslip::sample::{Channel, RigSample, SampleError, SampleLimits, SlipFriction
 use super::config::Compensation;
 use super::delay::{DelayLine, Planned};
 use super::effect::Relaxation;
-use super::error::{NoMeasurement, StepError};
+use super::error::{CompensationError, NoMeasurement, StepError};
 use super::first_order::FirstOrder;
 
 /// The smallest factor on friction that is compensated: beyond, a model says more than a reading can.
@@ -151,12 +151,42 @@ pub struct Compensator<T, const N: usize> {
     line: DelayLine<T, N>,
 }
 
-impl<T: Real, const N: usize> Compensator<T, N> {
-    pub(super) fn new(
-        compensation: Compensation<T>,
+impl<T: Real> Compensation<T> {
+    /// The compensator, before its first step, with room for `N` samples in its delay line.
+    ///
+    /// N may be 0 where no delay is compensated; else it must be at least
+    /// ⌈[`delay_s`](ForceDelay::delay_s)/[`sampling_step_s`](ForceDelay::sampling_step_s)⌉ + 1, and more
+    /// where the step jitters. `declared_radius_m` is the wheel's free-rolling radius in m, > 0, that
+    /// relative errors refer to. Memory: 4 N + some 40 numbers.
+    ///
+    /// # Errors
+    /// [`CompensationError::OutOfRange`] naming the first figure outside its range,
+    /// [`CompensationError::DelayDoesNotFit`].
+    pub fn build<const N: usize>(
+        self,
         declared_radius_m: T,
         limits: SampleLimits<T>,
-    ) -> Self {
+    ) -> Result<Compensator<T, N>, CompensationError> {
+        self.check(declared_radius_m)
+            .map_err(CompensationError::OutOfRange)?;
+        let capacity = u32::try_from(N).unwrap_or(u32::MAX);
+        if let Some(delay) = self.force_delay
+            && delay.delay_s > T::ZERO
+        {
+            // A hair of tolerance, so that a delay of whole steps is not lost to rounding.
+            let steps = delay.delay_s / delay.sampling_step_s * T::from_f64(1.0 - 1e-6);
+            let room = T::from_f64(f64::from(capacity) - 1.0);
+            let fits = steps <= room;
+            if !fits {
+                return Err(CompensationError::DelayDoesNotFit { capacity });
+            }
+        }
+        Ok(Compensator::new(self, declared_radius_m, limits))
+    }
+}
+
+impl<T: Real, const N: usize> Compensator<T, N> {
+    fn new(compensation: Compensation<T>, declared_radius_m: T, limits: SampleLimits<T>) -> Self {
         Self {
             compensation,
             declared_radius_m,

@@ -1,12 +1,10 @@
 use muslip::real::Real;
-use muslip::sample::SampleLimits;
 
-use super::compensator::Compensator;
 use super::effect::{
     EffectiveRadius, ForceDelay, ForceLag, LoadCrosstalk, LoadSensitivity, Relaxation,
     SpeedSensitivity, ThermalFade, ZeroDrift,
 };
-use super::error::{CompensationError, Figure};
+use super::error::Parameter;
 
 /// Which effects to compensate, each with its figures.
 ///
@@ -56,41 +54,9 @@ impl<T: Real> Compensation<T> {
         }
     }
 
-    /// The compensator, before its first step, with room for `N` samples in its delay line.
-    ///
-    /// N may be 0 where no delay is compensated; else it must be at least
-    /// ⌈[`delay_s`](ForceDelay::delay_s)/[`sampling_step_s`](ForceDelay::sampling_step_s)⌉ + 1, and more
-    /// where the step jitters. `declared_radius_m` is the wheel's free-rolling radius in m, > 0, that
-    /// relative errors refer to. Memory: 4 N + some 40 numbers.
-    ///
-    /// # Errors
-    /// [`CompensationError::OutOfRange`] naming the first figure outside its range,
-    /// [`CompensationError::DelayDoesNotFit`].
-    pub fn build<const N: usize>(
-        self,
-        declared_radius_m: T,
-        limits: SampleLimits<T>,
-    ) -> Result<Compensator<T, N>, CompensationError> {
-        self.check(declared_radius_m)
-            .map_err(CompensationError::OutOfRange)?;
-        let capacity = u32::try_from(N).unwrap_or(u32::MAX);
-        if let Some(delay) = self.force_delay
-            && delay.delay_s > T::ZERO
-        {
-            // A hair of tolerance, so that a delay of whole steps is not lost to rounding.
-            let steps = delay.delay_s / delay.sampling_step_s * T::from_f64(1.0 - 1e-6);
-            let room = T::from_f64(f64::from(capacity) - 1.0);
-            let fits = steps <= room;
-            if !fits {
-                return Err(CompensationError::DelayDoesNotFit { capacity });
-            }
-        }
-        Ok(Compensator::new(self, declared_radius_m, limits))
-    }
-
-    fn check(&self, declared_radius_m: T) -> Result<(), Figure> {
+    pub(super) fn check(&self, declared_radius_m: T) -> Result<(), Parameter> {
         if !(declared_radius_m > T::ZERO && declared_radius_m.is_finite()) {
-            return Err(Figure::DeclaredRadius);
+            return Err(Parameter::DeclaredRadius);
         }
         self.effective_radius.map_or(Ok(()), |e| e.check())?;
         self.force_delay.map_or(Ok(()), |e| e.check())?;
@@ -103,7 +69,7 @@ impl<T: Real> Compensation<T> {
         self.thermal_fade.map_or(Ok(()), |e| e.check())?;
         match self.longest_step_s {
             Some(step) if step > T::ZERO => Ok(()),
-            Some(_) => Err(Figure::LongestStep),
+            Some(_) => Err(Parameter::LongestStep),
             None => Ok(()),
         }
     }

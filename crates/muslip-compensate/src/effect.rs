@@ -2,7 +2,7 @@
 
 use muslip::real::Real;
 
-use super::error::Figure;
+use super::error::Parameter;
 
 /// The wheel rolls on another radius than the declared one R: slip = (v - R (1 + e) ω)/v.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -176,9 +176,9 @@ pub struct ThermalFade<T> {
 }
 
 /// A figure that is asked for: an error unless it holds.
-type Checked = Result<(), Figure>;
+type Checked = Result<(), Parameter>;
 
-fn demand(holds: bool, figure: Figure) -> Checked {
+fn demand(holds: bool, figure: Parameter) -> Checked {
     if holds { Ok(()) } else { Err(figure) }
 }
 
@@ -215,7 +215,7 @@ impl<T: Real> EffectiveRadius<T> {
         };
         demand(
             within(error, 0.5) && within(slope, 0.5) && positive(mean),
-            Figure::EffectiveRadius,
+            Parameter::EffectiveRadius,
         )
     }
 
@@ -261,7 +261,7 @@ impl<T: Real> ZeroDrift<T> {
                 start_s,
             } => rise_n.is_finite() && positive(time_constant_s) && start_s.is_finite(),
         };
-        demand(sound, Figure::ZeroDrift)
+        demand(sound, Parameter::ZeroDrift)
     }
 
     /// The zero in N, `since_s` after the first step.
@@ -284,7 +284,7 @@ impl<T: Real> ZeroDrift<T> {
 
 impl<T: Real> LoadCrosstalk<T> {
     pub(super) fn check(&self) -> Checked {
-        demand(within(self.share, 1.0), Figure::CrosstalkShare)
+        demand(within(self.share, 1.0), Parameter::CrosstalkShare)
     }
 }
 
@@ -294,7 +294,7 @@ impl<T: Real> LoadSensitivity<T> {
             within(self.sensitivity, 4.0)
                 && within(self.critical_slip_exponent, 4.0)
                 && positive(self.mean_normal_force_n),
-            Figure::LoadSensitivity,
+            Parameter::LoadSensitivity,
         )
     }
 
@@ -330,7 +330,7 @@ impl<T: Real> SpeedSensitivity<T> {
                 speed_scale_m_s,
             } => not_negative(floor) && positive(speed_scale_m_s),
         };
-        demand(sound, Figure::SpeedSensitivity)
+        demand(sound, Parameter::SpeedSensitivity)
     }
 
     /// Factor on friction at a slip and a vehicle speed in m/s.
@@ -360,7 +360,7 @@ impl<T: Real> SpeedSensitivity<T> {
 impl<T: Real> Relaxation<T> {
     pub(super) fn check(&self) -> Checked {
         let (Self::Slip { length_m } | Self::Force { length_m }) = *self;
-        demand(not_negative(length_m), Figure::RelaxationLength)
+        demand(not_negative(length_m), Parameter::RelaxationLength)
     }
 }
 
@@ -371,7 +371,7 @@ impl<T: Real> ThermalFade<T> {
                 && self.curvature_per_s2.is_finite()
                 && positive(self.time_constant_s)
                 && positive(self.reference_power_w),
-            Figure::ThermalFade,
+            Parameter::ThermalFade,
         )
     }
 
@@ -394,13 +394,16 @@ impl<T: Real> ThermalFade<T> {
 
 impl<T: Real> ForceDelay<T> {
     pub(super) fn check(&self) -> Checked {
-        demand(not_negative(self.delay_s), Figure::Delay)?;
-        demand(positive(self.sampling_step_s), Figure::SamplingStep)
+        demand(not_negative(self.delay_s), Parameter::Delay)?;
+        demand(positive(self.sampling_step_s), Parameter::SamplingStep)
     }
 }
 
 impl<T: Real> ForceLag<T> {
     pub(super) fn check(&self) -> Checked {
-        demand(not_negative(self.time_constant_s), Figure::LagTimeConstant)
+        demand(
+            not_negative(self.time_constant_s),
+            Parameter::LagTimeConstant,
+        )
     }
 }

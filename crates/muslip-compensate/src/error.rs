@@ -7,7 +7,7 @@ use muslip::sample::{Channel, SampleError};
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
-pub enum Figure {
+pub enum Parameter {
     /// The wheel's declared radius: finite, positive.
     DeclaredRadius,
     /// [`EffectiveRadius`](super::EffectiveRadius): errors within ±0.5, a positive mean.
@@ -40,8 +40,8 @@ pub enum Figure {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub enum CompensationError {
-    /// The figure is not finite or outside the range that [`Figure`] states.
-    OutOfRange(Figure),
+    /// The figure is not finite or outside the range that [`Parameter`] states.
+    OutOfRange(Parameter),
     /// The delay line holds fewer samples than delay and sampling step need.
     DelayDoesNotFit {
         /// Samples that the delay line holds.
@@ -82,7 +82,7 @@ pub enum NoMeasurement {
     DelayLineFilling,
 }
 
-impl fmt::Display for Figure {
+impl fmt::Display for Parameter {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
             Self::DeclaredRadius => "declared radius",

@@ -118,4 +118,4 @@ pub use effect::{
     EffectiveRadius, ForceDelay, ForceLag, LoadCrosstalk, LoadSensitivity, Relaxation,
     SpeedSensitivity, ThermalFade, ZeroDrift,
 };
-pub use error::{CompensationError, Figure, NoMeasurement, StepError};
+pub use error::{CompensationError, NoMeasurement, Parameter, StepError};

@@ -12,8 +12,8 @@ use muslip::real::Real;
 use muslip::sample::{Channel, RigSample, SampleError, SampleLimits, slip_friction};
 use muslip_compensate::{
     Compensated, CompensatedMeasurement, Compensation, CompensationError, Compensator,
-    EffectiveRadius, Figure, ForceDelay, ForceLag, LoadCrosstalk, LoadSensitivity, NoMeasurement,
-    Relaxation, SpeedSensitivity, StepError, ThermalFade, ZeroDrift,
+    EffectiveRadius, ForceDelay, ForceLag, LoadCrosstalk, LoadSensitivity, NoMeasurement,
+    Parameter, Relaxation, SpeedSensitivity, StepError, ThermalFade, ZeroDrift,
 };
 use proptest::prelude::*;
 use test_support::{Noise, Tolerance};
@@ -706,22 +706,22 @@ fn a_figure_outside_its_range_is_named() {
     }
     let out = CompensationError::OutOfRange;
     type Change = fn(&mut Compensation<f64>);
-    let cases: [(Change, Figure); 10] = [
+    let cases: [(Change, Parameter); 10] = [
         (
             |c| {
                 c.effective_radius = Some(EffectiveRadius::Constant {
                     relative_error: 0.6,
                 });
             },
-            Figure::EffectiveRadius,
+            Parameter::EffectiveRadius,
         ),
         (
             |c| c.force_delay.as_mut().unwrap().delay_s = -1e-3,
-            Figure::Delay,
+            Parameter::Delay,
         ),
         (
             |c| c.force_delay.as_mut().unwrap().sampling_step_s = 0.0,
-            Figure::SamplingStep,
+            Parameter::SamplingStep,
         ),
         (
             |c| {
@@ -729,7 +729,7 @@ fn a_figure_outside_its_range_is_named() {
                     time_constant_s: f64::NAN,
                 });
             },
-            Figure::LagTimeConstant,
+            Parameter::LagTimeConstant,
         ),
         (
             |c| {
@@ -739,15 +739,15 @@ fn a_figure_outside_its_range_is_named() {
                     start_s: 0.0,
                 });
             },
-            Figure::ZeroDrift,
+            Parameter::ZeroDrift,
         ),
         (
             |c| c.load_crosstalk = Some(LoadCrosstalk { share: 1.5 }),
-            Figure::CrosstalkShare,
+            Parameter::CrosstalkShare,
         ),
         (
             |c| c.load_sensitivity.as_mut().unwrap().mean_normal_force_n = 0.0,
-            Figure::LoadSensitivity,
+            Parameter::LoadSensitivity,
         ),
         (
             |c| {
@@ -755,19 +755,22 @@ fn a_figure_outside_its_range_is_named() {
                     length_m: f64::INFINITY,
                 });
             },
-            Figure::RelaxationLength,
+            Parameter::RelaxationLength,
         ),
         (
             |c| c.thermal_fade.as_mut().unwrap().reference_power_w = -1.0,
-            Figure::ThermalFade,
+            Parameter::ThermalFade,
         ),
-        (|c| c.longest_step_s = Some(f64::NAN), Figure::LongestStep),
+        (
+            |c| c.longest_step_s = Some(f64::NAN),
+            Parameter::LongestStep,
+        ),
     ];
     for (change, figure) in cases {
         assert_eq!(refused(change), out(figure));
     }
     let radius = everything::<f64>(0).build::<16>(0.0, limits());
-    assert_eq!(radius.unwrap_err(), out(Figure::DeclaredRadius));
+    assert_eq!(radius.unwrap_err(), out(Parameter::DeclaredRadius));
 }
 
 #[test]

@@ -58,7 +58,7 @@ pub struct ChannelNoise {
 
 /// A value with its standard deviation.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Estimate {
+pub struct ValueAndStd {
     /// Value.
     pub value: f64,
     /// Standard deviation.
@@ -101,7 +101,7 @@ pub struct Region {
 
 /// A reported figure of a mechanism.
 #[derive(Clone, Debug, Serialize)]
-pub struct Figure {
+pub struct ReportedParameter {
     /// Name by the contract.
     pub name: String,
     /// Value.
@@ -112,7 +112,7 @@ pub struct Figure {
     pub unit: String,
 }
 
-impl Figure {
+impl ReportedParameter {
     /// Of what a mechanism reports.
     pub(crate) fn new(reported: &Reported<f64>, std: f64) -> Self {
         Self {
@@ -165,7 +165,7 @@ pub struct NamedMechanism {
     /// Its equation.
     pub equation: String,
     /// Figures, the contract's first.
-    pub parameters: Vec<Figure>,
+    pub parameters: Vec<ReportedParameter>,
     /// Why it is believed.
     pub evidence: Evidence,
     /// What else it could be.
@@ -300,7 +300,7 @@ pub struct Diagnosis {
     /// Noise by channel.
     pub noise: BTreeMap<String, ChannelNoise>,
     /// The base law's parameters, refitted alone.
-    pub base: BTreeMap<String, Estimate>,
+    pub base: BTreeMap<String, ValueAndStd>,
     /// Where the repaired model differs from the base.
     pub r#where: Vec<Interval>,
     /// In which operating regions.

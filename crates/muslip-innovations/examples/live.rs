@@ -6,7 +6,7 @@ use std::error::Error;
 
 use muslip::law::Rudd;
 use muslip::sample::RigSample;
-use muslip_innovations::evidence::Band;
+use muslip_innovations::detection::Band;
 use muslip_innovations::monitor::{Balance, Verdict};
 use muslip_innovations::reading::Reading;
 use muslip_innovations::settings::{Rig, Sensors, Settings};

@@ -17,7 +17,7 @@
 //! noise     Σ parts: Ornstein-Uhlenbeck times a gain, constants of a run, a walk,
 //!           both integrated into the walk                                        whitener::Kind
 //! filter    y = z − h x,  s = h P hᵀ + r,  ν = y/√s;  P = U D Uᵀ                  whitener::Whitener
-//! evidence  Σ ν²/n against χ², Σ ν ν₋₁/n against its quantile, window by window   evidence
+//! evidence  Σ ν²/n against χ², Σ ν ν₋₁/n against its quantile, window by window   detection
 //!           fast: each ν, 256 a window; slow: sums over 32, 64 a window
 //! verdict   NotFormed, Consistent, Inconsistent { balance, band }                monitor::Verdict
 //! settings  rig, law, noise of the sensors, what the right model may leave out    settings::Settings
@@ -58,7 +58,7 @@
 //!
 //! # How often it is wrong
 //!
-//! A window is inconsistent with [`Evidence::false_alarm_probability`](evidence::Evidence::false_alarm_probability)
+//! A window is inconsistent with [`Detection::false_alarm_probability`](detection::Detection::false_alarm_probability)
 //! at most, under the right model with noise of the stated sizes; 1e-6 unless said otherwise, or one false alarm in 21
 //! hours or more of all balances formed at 1 kHz. Over simulated stops, with the probability raised so that there is something to
 //! count, alarms are as many as stated (`cargo test -p muslip-innovations --test verdicts -- --nocapture` prints them).
@@ -125,7 +125,7 @@
     )
 )]
 
-pub mod evidence;
+pub mod detection;
 mod level;
 pub mod monitor;
 pub mod reading;

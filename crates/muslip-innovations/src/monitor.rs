@@ -3,10 +3,10 @@
 use muslip::law::Rudd;
 use muslip::real::Real;
 
-use crate::evidence::{Band, BandLimits, Bands, Figures, Limits, Window};
+use crate::detection::{Band, BandLimits, Bands, Figures, Limits, Window};
 use crate::level::{Level, Noise, Rate, Step};
 use crate::reading::{Reading, StepError};
-use crate::settings::{Coloured, Setting, Settings};
+use crate::settings::{Coloured, Setting, Settings, SettingsError};
 use crate::tyre::Tyre;
 use crate::whitener::Innovation;
 
@@ -83,11 +83,22 @@ struct Balances<T> {
     started: bool,
 }
 
+impl<T: Real> Settings<T> {
+    /// The monitor, before its first step.
+    ///
+    /// # Errors
+    /// [`SettingsError::OutOfRange`] naming the first setting outside its range.
+    pub fn build(self) -> Result<Monitor<T>, SettingsError> {
+        self.check().map_err(SettingsError::OutOfRange)?;
+        Monitor::new(self).map_err(SettingsError::OutOfRange)
+    }
+}
+
 impl<T: Real> Monitor<T> {
-    pub(crate) fn new(settings: Settings<T>) -> Result<Self, Setting> {
+    fn new(settings: Settings<T>) -> Result<Self, Setting> {
         Ok(Self {
             balances: Balances::new(&settings)?,
-            limits: BandLimits::new(&settings.evidence),
+            limits: BandLimits::new(&settings.detection),
             settings,
             tyre: Bands::empty(),
             wheel: Bands::empty(),

@@ -6,8 +6,7 @@ use muslip::law::Rudd;
 use muslip::real::Real;
 use muslip::sample::SampleLimits;
 
-use crate::evidence::Evidence;
-use crate::monitor::Monitor;
+use crate::detection::Detection;
 
 /// Wheel and vehicle.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -109,7 +108,7 @@ pub struct Forming<T> {
     pub gate_stds: T,
 }
 
-/// Everything that the balances need to know. `build` it into a [`Monitor`].
+/// Everything that the balances need to know. `build` it into a [`Monitor`](crate::Monitor).
 ///
 /// Sizes of noise are not fitted here, as a diagnosis of recordings does: false alarms are as stated only where
 /// they are as stated. Too large they make the monitor blind, too small they raise alarms.
@@ -126,7 +125,7 @@ pub struct Settings<T> {
     /// When a balance is formed.
     pub forming: Forming<T>,
     /// How the evidence is weighed.
-    pub evidence: Evidence<T>,
+    pub detection: Detection<T>,
 }
 
 /// A setting, or a group of settings that are checked alike.
@@ -153,8 +152,8 @@ pub enum Setting {
     LongestStep,
     /// [`Forming::gate_stds`].
     Gate,
-    /// [`Evidence`].
-    Evidence,
+    /// [`Detection`].
+    Detection,
 }
 
 /// Settings of which no monitor can be made.
@@ -178,7 +177,7 @@ impl fmt::Display for Setting {
             Self::Limits => "limits of a sample",
             Self::LongestStep => "longest step",
             Self::Gate => "gate",
-            Self::Evidence => "window or probability of the evidence",
+            Self::Detection => "window or probability of the detection",
         })
     }
 }
@@ -283,20 +282,11 @@ impl<T: Real> Settings<T> {
             sensors,
             unmodelled: Unmodelled::usual(&rig, &sensors, largest_drag_n),
             forming: Forming::usual(T::from_f64(0.02) * largest_drag_n),
-            evidence: Evidence::usual(),
+            detection: Detection::usual(),
         }
     }
 
-    /// The monitor, before its first step.
-    ///
-    /// # Errors
-    /// [`SettingsError::OutOfRange`] naming the first setting outside its range.
-    pub fn build(self) -> Result<Monitor<T>, SettingsError> {
-        self.check().map_err(SettingsError::OutOfRange)?;
-        Monitor::new(self).map_err(SettingsError::OutOfRange)
-    }
-
-    fn check(&self) -> Result<(), Setting> {
+    pub(crate) fn check(&self) -> Result<(), Setting> {
         let positive = |x: T| x > T::ZERO && x.is_finite();
         let limits = &self.forming.sample;
         let checks = [
@@ -327,7 +317,7 @@ impl<T: Real> Settings<T> {
                     && self.forming.gate_stds <= T::from_f64(100.0),
                 Setting::Gate,
             ),
-            (self.evidence.in_range(), Setting::Evidence),
+            (self.detection.in_range(), Setting::Detection),
         ];
         match checks.iter().find(|(in_range, _)| !in_range) {
             Some((_, setting)) => Err(*setting),

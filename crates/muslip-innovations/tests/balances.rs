@@ -12,7 +12,7 @@ mod dense;
 mod simulation;
 
 use dense::{Kind, Problem};
-use muslip_innovations::evidence::Band;
+use muslip_innovations::detection::Band;
 use muslip_innovations::monitor::{Balance, Innovations, Monitor, Verdict};
 use muslip_innovations::reading::{Channel, Reading, StepError};
 use muslip_innovations::settings::{Coloured, Setting, Settings, SettingsError};
@@ -529,9 +529,9 @@ fn settings_outside_their_range_are_refused_by_name() {
     );
     refused(|s| s.forming.longest_step_s = 0.0, Setting::LongestStep);
     refused(|s| s.forming.gate_stds = 1.0, Setting::Gate);
-    refused(|s| s.evidence.slow_block = 0, Setting::Evidence);
+    refused(|s| s.detection.slow_block = 0, Setting::Detection);
     refused(
-        |s| s.evidence.false_alarm_probability = 0.5,
-        Setting::Evidence,
+        |s| s.detection.false_alarm_probability = 0.5,
+        Setting::Detection,
     );
 }

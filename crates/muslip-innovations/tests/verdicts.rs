@@ -10,7 +10,7 @@
 
 mod simulation;
 
-use muslip_innovations::evidence::Band;
+use muslip_innovations::detection::Band;
 use muslip_innovations::monitor::{Balance, Monitor, Verdict};
 use muslip_innovations::settings::Settings;
 use simulation::{DT_S, MASS_KG, Plant, run, settings};
@@ -24,9 +24,9 @@ fn alarms(
     seeds: core::ops::Range<u64>,
 ) -> [(f64, f64); 2] {
     const SAMPLES: usize = 8000;
-    let evidence = &settings.evidence;
-    let slow = u32::from(evidence.slow_block) * u32::from(evidence.slow_window);
-    let lengths = [u32::from(evidence.fast_window), slow];
+    let detection = &settings.detection;
+    let slow = u32::from(detection.slow_block) * u32::from(detection.slow_window);
+    let lengths = [u32::from(detection.fast_window), slow];
     let mut all = [(0.0, 0.0); 2];
     for seed in seeds {
         let mut monitor: Monitor<f64> = settings.build().unwrap();
@@ -49,7 +49,7 @@ fn alarms(
 
 /// Holds the alarms of each band against the stated probability, within five standard errors of a count.
 fn as_stated(what: &str, plant: &Plant, settings: &Settings<f64>) {
-    let probability = settings.evidence.false_alarm_probability;
+    let probability = settings.detection.false_alarm_probability;
     for ((raised, windows), band) in alarms(plant, settings, 0..60).into_iter().zip(BANDS) {
         let expected = probability * windows;
         println!("{what}, {band:?}: {raised} of {windows}, {expected:.1} stated");
@@ -62,7 +62,7 @@ fn as_stated(what: &str, plant: &Plant, settings: &Settings<f64>) {
 
 fn at(probability: f64) -> Settings<f64> {
     let mut settings = settings();
-    settings.evidence.false_alarm_probability = probability;
+    settings.detection.false_alarm_probability = probability;
     settings
 }
 

@@ -39,7 +39,7 @@ pub use monte_carlo::{ArticleStream, Course, Regression, SecondStart};
 pub use pages::{CONVERGENCE_PAGE, article_markdown, convergence_page, report_page};
 pub use pass::{PassError, Step, first_start, second_start, traced};
 pub use reproduce::{Paper, PaperOptions, article_streams, reproduce, statements, work};
-pub use statement::{Ours, Statement, Verdict};
+pub use statement::{Ours, Reproduction, Statement};
 pub use statistics::Band;
 pub use stream::{FRICTION_STD, POINTS, TRUTH, frictions, slips};
 pub use yardstick::{Accuracy, Cell, Contender, Errors};

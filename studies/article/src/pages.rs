@@ -6,7 +6,7 @@ use muslip_report::{Block, KeyFigure, Report, Section, Tone};
 use super::figures::{Part, convergence, figures};
 use super::pass::PassError;
 use super::reproduce::{Paper, PaperOptions};
-use super::statement::Verdict;
+use super::statement::Reproduction;
 
 /// Name of the page with the animation, beside the report.
 pub const CONVERGENCE_PAGE: &str = "convergence.html";
@@ -52,7 +52,7 @@ pub fn report_page(paper: &Paper) -> Result<Report, PassError> {
         .iter()
         .filter(|statement| statement.verdict.is_some())
         .count();
-    let key = |verdict: Verdict, remark: &str| KeyFigure {
+    let key = |verdict: Reproduction, remark: &str| KeyFigure {
         name: verdict.words().to_owned(),
         value: counted(verdict).to_string(),
         remark: remark.to_owned(),
@@ -107,15 +107,15 @@ pub fn report_page(paper: &Paper) -> Result<Report, PassError> {
         verdict: format!(
             "Of {judged} statements {} are reproduced, {} lie within the band of our streams, {} are not \
              reproduced.",
-            counted(Verdict::Reproduced),
-            counted(Verdict::WithinTheBand),
-            counted(Verdict::NotReproduced)
+            counted(Reproduction::Reproduced),
+            counted(Reproduction::WithinTheBand),
+            counted(Reproduction::NotReproduced)
         ),
         tone: Tone::Neutral,
         key_figures: vec![
-            key(Verdict::Reproduced, "as the article has it"),
-            key(Verdict::WithinTheBand, "as some streams have it"),
-            key(Verdict::NotReproduced, "see the table"),
+            key(Reproduction::Reproduced, "as the article has it"),
+            key(Reproduction::WithinTheBand, "as some streams have it"),
+            key(Reproduction::NotReproduced, "see the table"),
         ],
         sections,
         command: options.command(),

@@ -11,7 +11,7 @@ use super::stream::{FRICTION_STD, TRUTH};
 
 /// Whether a statement of the article is found again.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Verdict {
+pub enum Reproduction {
     /// An equation holds; a figure is our median to the digits that the article gives; what it says of a
     /// stream holds in at least 95 % of ours.
     Reproduced,
@@ -21,7 +21,7 @@ pub enum Verdict {
     NotReproduced,
 }
 
-impl Verdict {
+impl Reproduction {
     /// In words.
     pub fn words(self) -> &'static str {
         match self {
@@ -62,13 +62,13 @@ impl Printed {
         format!("{:.*}", self.decimals, self.value)
     }
 
-    fn verdict(self, band: Band) -> Verdict {
+    fn verdict(self, band: Band) -> Reproduction {
         if format!("{:.*}", self.decimals, band.median) == self.text() {
-            Verdict::Reproduced
+            Reproduction::Reproduced
         } else if band.holds(self.value) {
-            Verdict::WithinTheBand
+            Reproduction::WithinTheBand
         } else {
-            Verdict::NotReproduced
+            Reproduction::NotReproduced
         }
     }
 }
@@ -101,7 +101,7 @@ pub struct Statement {
     /// What we find.
     pub ours: Ours,
     /// Whether the two agree; none where the article says nothing.
-    pub verdict: Option<Verdict>,
+    pub verdict: Option<Reproduction>,
 }
 
 impl Statement {
@@ -111,7 +111,7 @@ impl Statement {
             about,
             article: article.into(),
             ours: Ours::Exact(text),
-            verdict: Some(Verdict::of_equation(holds)),
+            verdict: Some(Reproduction::of_equation(holds)),
         }
     }
 
@@ -155,7 +155,7 @@ impl Statement {
             about,
             article: article.into(),
             ours: Ours::Share(share),
-            verdict: Some(Verdict::of_share(share)),
+            verdict: Some(Reproduction::of_share(share)),
         }
     }
 }
@@ -388,16 +388,19 @@ mod tests {
             high: 0.22,
         };
         let verdict = |value, decimals| Printed { value, decimals }.verdict(band);
-        assert_eq!(verdict(0.19, 2), Verdict::Reproduced);
-        assert_eq!(verdict(0.190, 3), Verdict::WithinTheBand);
-        assert_eq!(verdict(0.25, 2), Verdict::NotReproduced);
+        assert_eq!(verdict(0.19, 2), Reproduction::Reproduced);
+        assert_eq!(verdict(0.190, 3), Reproduction::WithinTheBand);
+        assert_eq!(verdict(0.25, 2), Reproduction::NotReproduced);
     }
 
     #[test]
     fn a_share_is_judged_by_its_size() {
-        assert_eq!(Verdict::of_share(0.95), Verdict::Reproduced);
-        assert_eq!(Verdict::of_share(0.5), Verdict::WithinTheBand);
-        assert_eq!(Verdict::of_share(0.01), Verdict::NotReproduced);
-        assert_eq!(Verdict::of_share(f64::NAN), Verdict::NotReproduced);
+        assert_eq!(Reproduction::of_share(0.95), Reproduction::Reproduced);
+        assert_eq!(Reproduction::of_share(0.5), Reproduction::WithinTheBand);
+        assert_eq!(Reproduction::of_share(0.01), Reproduction::NotReproduced);
+        assert_eq!(
+            Reproduction::of_share(f64::NAN),
+            Reproduction::NotReproduced
+        );
     }
 }

@@ -2,7 +2,7 @@
 
 use muslip::law::Rudd;
 use muslip::sample::RigSample;
-use muslip_innovations::evidence::{Band, Evidence};
+use muslip_innovations::detection::{Band, Detection};
 use muslip_innovations::monitor::{Balance, Monitor};
 use muslip_innovations::reading::Reading;
 use muslip_innovations::settings::{Rig, Sensors, Settings};
@@ -27,11 +27,11 @@ pub fn start() -> Memory {
     let sensors = Sensors::white(20.0, 0.5, 160.0, 15.0, 5.0);
     let mut settings = Settings::usual(rig, law, sensors, 1600.0);
     // So short that windows of both bands close within the samples, on one and the same of them, too.
-    settings.evidence = Evidence {
+    settings.detection = Detection {
         fast_window: 8,
         slow_block: 1,
         slow_window: 8,
-        ..Evidence::usual()
+        ..Detection::usual()
     };
     Memory {
         monitor: settings.build().ok().unwrap(),

@@ -6,7 +6,7 @@ use super::constants::{
 use super::finding::Timing;
 use super::recording::{Block, Recording, blocks, spans};
 use super::signal::{Signal, low_pass};
-use super::squares::{Balance, Estimate, colour_of, refine};
+use super::squares::{Balance, Solution, colour_of, refine};
 use super::vehicle::{constants_of, impulse_like, powers};
 use crate::campaign::Rig;
 
@@ -192,7 +192,7 @@ fn speed(rig: &Rig, run: &Recording, vehicle: Timing, moment: f64) -> Signal {
 
 /// What the law says, given what is known of the vehicle speed: its delay, and by what second moment it is slower, s².
 #[must_use]
-pub fn law(rig: &Rig, runs: &[Recording], vehicle: Timing, moment: f64) -> Option<Estimate> {
+pub fn law(rig: &Rig, runs: &[Recording], vehicle: Timing, moment: f64) -> Option<Solution> {
     if !(rig.radius_m > 0.0 && rig.peak_friction > 0.0 && rig.critical_slip > 0.0) {
         return None;
     }

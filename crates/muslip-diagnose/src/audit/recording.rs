@@ -11,7 +11,7 @@ use crate::smooth::median_in_place;
 
 /// A cleaned channel.
 #[derive(Clone, Debug, Default)]
-pub struct Channel {
+pub struct Column {
     /// Readings without outliers, gaps bridged.
     pub clean: Vec<f64>,
     /// The same as a function of time; of a held channel its renewals, joined by straight lines.
@@ -30,22 +30,22 @@ pub struct Recording {
     /// Typical step in s.
     pub step: f64,
     /// Wheel speed in rad/s.
-    pub wheel: Channel,
+    pub wheel: Column,
     /// Vehicle speed in m/s.
-    pub speed: Channel,
+    pub speed: Column,
     /// Drag in N.
-    pub drag: Channel,
+    pub drag: Column,
     /// Normal force in N.
-    pub load: Channel,
+    pub load: Column,
     /// Brake torque in N m, measured or commanded, with its column's name.
-    pub brake: Option<(&'static str, Channel)>,
+    pub brake: Option<(&'static str, Column)>,
     /// Stretches of samples without gaps in which the vehicle moves.
     pub moving: Vec<Range<usize>>,
 }
 
-fn channel(time: &[f64], values: &[f64], name: &str) -> Channel {
+fn channel(time: &[f64], values: &[f64], name: &str) -> Column {
     if values.len() != time.len() || time.is_empty() {
-        return Channel::default();
+        return Column::default();
     }
     let (clean, _) = clean("", name, time, values, &mut Vec::new());
     let hold = hold(time, values);
@@ -54,7 +54,7 @@ fn channel(time: &[f64], values: &[f64], name: &str) -> Channel {
     } else {
         Signal::new(time, &clean)
     };
-    Channel {
+    Column {
         clean,
         signal,
         hold,
@@ -79,7 +79,7 @@ fn renewed(time: &[f64], clean: &[f64], period: f64) -> Signal {
     Signal::new(&times, &values)
 }
 
-fn brake(rig: &Rig, run: &Run) -> Option<(&'static str, Channel)> {
+fn brake(rig: &Rig, run: &Run) -> Option<(&'static str, Column)> {
     if let (Some(pressure), Some(gain)) = (&run.brake_pressure_pa, rig.torque_per_pressure_nm_pa)
         && pressure.iter().any(|x| x.is_finite())
     {

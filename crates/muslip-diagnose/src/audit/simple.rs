@@ -1,7 +1,7 @@
 //! Findings that one channel shows by itself: steps and holds.
 
 use super::finding::{Finding, Word};
-use super::recording::{Channel, Recording};
+use super::recording::{Column, Recording};
 use super::steps::step_of;
 use crate::campaign::Run;
 use crate::smooth::{difference_sigma, median_in_place};
@@ -35,8 +35,8 @@ fn quantised(name: &str, unit: &str, channels: &[&[f64]]) -> Option<Finding> {
     })
 }
 
-fn held<'a>(name: &str, channels: impl Iterator<Item = &'a Channel>) -> Option<Finding> {
-    let channels: Vec<&Channel> = channels.filter(|c| !c.clean.is_empty()).collect();
+fn held<'a>(name: &str, channels: impl Iterator<Item = &'a Column>) -> Option<Finding> {
+    let channels: Vec<&Column> = channels.filter(|c| !c.clean.is_empty()).collect();
     let mut periods: Vec<f64> = channels
         .iter()
         .filter_map(|c| c.hold)

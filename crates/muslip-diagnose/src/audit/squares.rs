@@ -23,7 +23,7 @@ pub trait Balance {
 
 /// An estimate.
 #[derive(Clone, Debug)]
-pub struct Estimate {
+pub struct Solution {
     /// The unknowns.
     pub unknowns: Vec<f64>,
     /// Their standard deviations.
@@ -192,7 +192,7 @@ pub fn refine(
     coefficients: &[f64],
     passes: usize,
     fixed: &[bool],
-) -> Option<Estimate> {
+) -> Option<Solution> {
     let prior = balance.prior();
     let steps = balance.steps();
     let free: Vec<usize> = (0..start.len()).filter(|&i| !fixed[i]).collect();
@@ -227,7 +227,7 @@ pub fn refine(
         let (matrix, vector) = total(&blocks, &unknowns, &prior, &free);
         let inverse = matrix.clone().try_inverse()?;
         let step = &inverse * &vector;
-        last = Some(Estimate {
+        last = Some(Solution {
             std: spread(&inverse, &blocks, (&unknowns, &prior), &free),
             unknowns: unknowns.clone(),
             sum,
@@ -252,7 +252,7 @@ pub fn refine(
                 .map(|(p, &i)| (step[p] / steps[i]).abs())
                 .fold(0.0, f64::max);
             if moved < SETTLED {
-                return last.map(|estimate| Estimate {
+                return last.map(|estimate| Solution {
                     unknowns,
                     ..estimate
                 });
@@ -279,13 +279,13 @@ pub fn refine(
         if !moved && pass + 1 < passes {
             // Converged: one more pass only for the figures at the end.
             return Some(last.map_or_else(
-                || Estimate {
+                || Solution {
                     unknowns: unknowns.clone(),
                     std: vec![f64::INFINITY; unknowns.len()],
                     sum,
                     rows,
                 },
-                |estimate| Estimate {
+                |estimate| Solution {
                     unknowns: unknowns.clone(),
                     ..estimate
                 },

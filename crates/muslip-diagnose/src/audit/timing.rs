@@ -7,7 +7,7 @@ use super::finding::{Finding, Timing, Word};
 use super::hold::Hold;
 use super::law;
 use super::recording::Recording;
-use super::squares::Estimate;
+use super::squares::Solution;
 use super::vehicle::{Left, vehicle};
 use super::wheel::wheel;
 use crate::campaign::Rig;
@@ -29,11 +29,11 @@ pub struct Timings {
     /// What the vehicle's balance leaves.
     pub vehicle_left: Option<Left>,
     /// What each balance said, for a closer look: vehicle, wheel, law.
-    pub estimates: [Option<Estimate>; 3],
+    pub estimates: [Option<Solution>; 3],
 }
 
 /// An estimate's unknown as a delay, with its waiting where the channel is held and at least the sampler's doubt.
-fn delay(estimate: &Estimate, place: usize, held: f64, step: f64) -> Timing {
+fn delay(estimate: &Solution, place: usize, held: f64, step: f64) -> Timing {
     let std = (SPREAD_FACTOR * estimate.std[place])
         .hypot(STEP_SHARE * step)
         .hypot(FORM_SHARE * estimate.unknowns[place])

@@ -5,7 +5,7 @@ use super::constants::{
 };
 use super::recording::{Block, Recording, blocks, spans};
 use super::signal::low_pass;
-use super::squares::{Balance, Estimate, colour_of, refine, rest, scan_value};
+use super::squares::{Balance, Solution, colour_of, refine, rest, scan_value};
 
 /// Unknowns: scale of the drag's impulse, delay in s, and signed square of the time constant by which v is slower, s².
 struct Vehicle<'a> {
@@ -131,7 +131,7 @@ pub struct Left {
 
 /// What the balance says: delay of v against the drag, and by what filter it is slower.
 #[must_use]
-pub fn vehicle(runs: &[Recording], mass: f64) -> Option<(Estimate, Left)> {
+pub fn vehicle(runs: &[Recording], mass: f64) -> Option<(Solution, Left)> {
     let stretches = spans(runs);
     let whole: f64 = stretches.iter().map(|(_, a, b)| b - a).sum();
     let step = VEHICLE_STEP_S.max(whole / MOST_ROWS as f64);

@@ -6,7 +6,7 @@ use super::constants::{
 use super::finding::Timing;
 use super::recording::{Block, Recording, blocks};
 use super::signal::low_pass;
-use super::squares::{Balance, Estimate, colour_of, refine, scan_value};
+use super::squares::{Balance, Solution, colour_of, refine, scan_value};
 use super::vehicle::{constants_of, powers};
 use crate::campaign::Rig;
 
@@ -143,7 +143,7 @@ fn turning(rig: &Rig, runs: &[Recording]) -> Vec<(usize, f64, f64)> {
 
 /// What the balance says, given what the law says of the wheel speed before any hold.
 #[must_use]
-pub fn wheel(rig: &Rig, runs: &[Recording], known: Timing) -> Option<Estimate> {
+pub fn wheel(rig: &Rig, runs: &[Recording], known: Timing) -> Option<Solution> {
     if !(rig.wheel_inertia_kg_m2 > 0.0 && rig.radius_m > 0.0) {
         return None;
     }

@@ -16,14 +16,14 @@ use crate::innovations::noise::{BalanceParts, Slopes};
 use crate::innovations::rows::rows_of;
 use crate::innovations::screen::{Score, scores};
 use crate::looked::{self, POWER, Seen};
-use crate::mechanism::{Evidence, Id};
+use crate::mechanism::{Id, Residuals};
 use crate::model::{Model, Term};
 
 /// Finalists that are judged in each round: best at the sensors' noise, and by the geometric mean of the gains at both
 /// levels, which is what trials are weighed by.
 const FINALISTS: [usize; 2] = [3, 4];
 
-fn evidence(data: &Data, model: &Model) -> Vec<Evidence> {
+fn evidence(data: &Data, model: &Model) -> Vec<Residuals> {
     data.series
         .iter()
         .enumerate()
@@ -34,7 +34,7 @@ fn evidence(data: &Data, model: &Model) -> Vec<Evidence> {
                 weight[k] = s.drag_sigma.powi(-2).min(1e12);
             }
             let none = r.tyre.is_empty();
-            Evidence {
+            Residuals {
                 predicted: if none {
                     vec![0.0; s.len()]
                 } else {

@@ -8,7 +8,7 @@ use crate::constants::VAGUE_DELAY_S;
 use crate::looked::{POWER, looked_for};
 use crate::mechanism::{Balance, Id};
 use crate::number::finite_or_zero;
-use crate::outcome::{ChannelNoise, Estimate, Fit, LookedFor, MinimumDetectable, Trace};
+use crate::outcome::{ChannelNoise, Fit, LookedFor, MinimumDetectable, Trace, ValueAndStd};
 use crate::proof::Predicted;
 use crate::repaired::Repaired;
 use crate::series::Series;
@@ -54,7 +54,7 @@ impl Answer<'_> {
         .collect()
     }
 
-    pub(super) fn base(&self) -> BTreeMap<String, Estimate> {
+    pub(super) fn base(&self) -> BTreeMap<String, ValueAndStd> {
         let mut all = BTreeMap::new();
         for (judged, prefix) in [
             (&self.decision.base, ""),
@@ -68,7 +68,7 @@ impl Answer<'_> {
                 let value = judged.model.base[i].exp();
                 all.insert(
                     format!("{prefix}{name}"),
-                    Estimate {
+                    ValueAndStd {
                         value: finite_or_zero(value),
                         std: finite_or_zero(value * covariance[(i, i)].max(0.0).sqrt()),
                     },

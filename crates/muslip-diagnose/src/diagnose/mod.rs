@@ -19,7 +19,7 @@ use crate::looked::looked_for;
 use crate::mechanism::{Balance, Describe, Id};
 use crate::model::Model;
 use crate::number::finite_or_zero;
-use crate::outcome::{Diagnosis, Estimate, Fault, Fit, Recording, Role, Verdict};
+use crate::outcome::{Diagnosis, Fault, Fit, Recording, Role, ValueAndStd, Verdict};
 use crate::repaired::{Predicting, Repaired};
 use crate::series::Series;
 use crate::split::Split;
@@ -83,7 +83,7 @@ impl Given<'_> {
 
     fn undecided(&self, audit: Audit) -> Diagnosis {
         let rig = self.rig;
-        let estimate = |value: f64| Estimate { value, std: value };
+        let estimate = |value: f64| ValueAndStd { value, std: value };
         let law = Model::of_law(rig.peak_friction, rig.critical_slip).base;
         let repaired = Repaired {
             schema: "muslip.model/1".to_owned(),

@@ -10,7 +10,9 @@ use crate::figures::figures;
 use crate::innovations::dependence::Dependence;
 use crate::mechanism::{Id, Reported, Speed};
 use crate::number::finite_or_zero;
-use crate::outcome::{Alternative, Evidence, Figure, NamedMechanism, Unexplained, sentence};
+use crate::outcome::{
+    Alternative, Evidence, NamedMechanism, ReportedParameter, Unexplained, sentence,
+};
 use crate::separating::separating_test;
 
 /// Smallest delay in s that is named where the timing is as sure as this.
@@ -56,7 +58,7 @@ impl Answer<'_> {
                     equation: mechanism.equation().to_owned(),
                     parameters: reported
                         .iter()
-                        .map(|(r, std)| Figure::new(r, *std))
+                        .map(|(r, std)| ReportedParameter::new(r, *std))
                         .collect(),
                     evidence: Evidence {
                         delta_bic: 2.0 * trial.weight(),
@@ -153,7 +155,7 @@ impl Answer<'_> {
             balance: id.balance().as_str(),
             statement: sentence(&mechanism.statement(core::slice::from_ref(&reported), &[value])),
             equation: mechanism.equation().to_owned(),
-            parameters: vec![Figure::new(&reported, std)],
+            parameters: vec![ReportedParameter::new(&reported, std)],
             evidence: Evidence {
                 delta_bic: z * z,
                 // Not measured: the timing is fitted to all runs together.

@@ -8,7 +8,7 @@ use super::noise::Slopes;
 use super::rows::{Rows, Triple, quiet_force, rows, rows_of};
 use crate::correction::Levers;
 use crate::data::{Data, WIDTH};
-use crate::mechanism::{Balance, Evidence, Id};
+use crate::mechanism::{Balance, Id, Residuals};
 use crate::model::{Model, Term};
 use crate::number::{Dual, Number, finite_or_zero};
 use crate::prepare::mean_twice_about;
@@ -319,7 +319,7 @@ pub fn table(
     data: &Data,
     model: &Model,
     slopes: &Slopes,
-    evidence: &[Evidence],
+    evidence: &[Residuals],
     extra: &[Dependence],
     free: &[Dependence],
     wanted: &dyn Fn(Id) -> bool,

@@ -210,7 +210,7 @@ fn with_sizes(mut fresh: Vec<BalanceParts>, old: &[BalanceParts]) -> Vec<Balance
 
 /// Columns of a model that nothing is to be added to.
 fn table_of(data: &Data, model: &Model, slopes: &Slopes, extra: &[Dependence]) -> Table {
-    let none = vec![crate::mechanism::Evidence::default(); data.series.len()];
+    let none = vec![crate::mechanism::Residuals::default(); data.series.len()];
     table(data, model, slopes, &none, extra, &[], &|_| false)
 }
 

@@ -2,8 +2,8 @@
 
 use super::guide::runs;
 use super::{
-    Against, Alias, Balance, Compensation, Context, Describe, Evidence, Example, Guide, Id, Kind,
-    Law, Mechanism, Memory, Parameter, Reported, Sign, Stage, State,
+    Against, Alias, Balance, Compensation, Context, Describe, Example, Guide, Id, Kind, Law,
+    Mechanism, Memory, Parameter, Reported, Residuals, Sign, Stage, State,
 };
 use crate::number::Number;
 use crate::series::Series;
@@ -30,7 +30,7 @@ impl Describe for AeroDrag {
         &self,
         _context: &Context,
         _series: &[Series],
-        _evidence: &[Evidence],
+        _evidence: &[Residuals],
     ) -> Vec<Vec<f64>> {
         vec![vec![0.0]]
     }

@@ -1,8 +1,8 @@
 //! The sharpness of the peak or the friction of the full skid is not that of the two-parameter law.
 
 use super::{
-    Alias, Balance, Compensation, Context, Describe, Evidence, Example, Guide, Id, Kind, Law,
-    Mechanism, Memory, Parameter, Reported, Sign, Stage, State,
+    Alias, Balance, Compensation, Context, Describe, Example, Guide, Id, Kind, Law, Mechanism,
+    Memory, Parameter, Reported, Residuals, Sign, Stage, State,
 };
 use crate::number::Number;
 use crate::series::Series;
@@ -52,7 +52,7 @@ impl Describe for CurveShape {
         &self,
         _context: &Context,
         _series: &[Series],
-        _evidence: &[Evidence],
+        _evidence: &[Residuals],
     ) -> Vec<Vec<f64>> {
         let mut starts = vec![vec![0.0, 0.0], vec![0.3, 1.0], vec![0.0, 2.0]];
         if self.form == Form::Stretched {

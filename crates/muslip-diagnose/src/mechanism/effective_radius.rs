@@ -1,8 +1,8 @@
 //! The rolling radius is not the rig file's (constant, or changing with load or speed), so slip is biased.
 
 use super::{
-    Balance, Compensation, Context, Describe, Evidence, Example, Guide, Id, Kind, Law, Mechanism,
-    Memory, Parameter, Reported, Sign, Stage, State,
+    Balance, Compensation, Context, Describe, Example, Guide, Id, Kind, Law, Mechanism, Memory,
+    Parameter, Reported, Residuals, Sign, Stage, State,
 };
 use crate::number::Number;
 use crate::series::Series;
@@ -57,7 +57,7 @@ impl Describe for EffectiveRadius {
         &self,
         _context: &Context,
         _series: &[Series],
-        _evidence: &[Evidence],
+        _evidence: &[Residuals],
     ) -> Vec<Vec<f64>> {
         vec![vec![0.0; if self.form == Form::Constant { 1 } else { 2 }]]
     }

@@ -145,7 +145,7 @@ pub struct Reported<T> {
 
 /// What the base model leaves over on one run: a search can look at it to find where to start.
 #[derive(Clone, Debug, Default)]
-pub struct Evidence {
+pub struct Residuals {
     /// Reading predicted by the model so far in N.
     pub predicted: Vec<f64>,
     /// Measured minus predicted in N.
@@ -338,7 +338,8 @@ pub trait Describe: Send + Sync {
     /// Its parameters for this campaign.
     fn parameters(&self, context: &Context) -> Vec<Parameter>;
     /// Where a search for its parameters may start.
-    fn starts(&self, context: &Context, series: &[Series], evidence: &[Evidence]) -> Vec<Vec<f64>>;
+    fn starts(&self, context: &Context, series: &[Series], evidence: &[Residuals])
+    -> Vec<Vec<f64>>;
     /// Its equation.
     fn equation(&self) -> &'static str;
     /// One sentence for an engineer, with the figure and its unit.

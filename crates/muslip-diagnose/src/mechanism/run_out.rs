@@ -2,8 +2,8 @@
 
 use super::once_a_turn::Form;
 use super::{
-    Alias, Balance, Compensation, Context, Describe, Evidence, Example, Guide, Id, Kind, Law,
-    Mechanism, Memory, Parameter, Reported, Sign, Stage, State,
+    Alias, Balance, Compensation, Context, Describe, Example, Guide, Id, Kind, Law, Mechanism,
+    Memory, Parameter, Reported, Residuals, Sign, Stage, State,
 };
 use crate::number::Number;
 use crate::series::Series;
@@ -58,7 +58,7 @@ impl Describe for RunOut {
         &self,
         context: &Context,
         series: &[Series],
-        _evidence: &[Evidence],
+        _evidence: &[Residuals],
     ) -> Vec<Vec<f64>> {
         // Without the wheel's balance a radius that varies is the same as an encoder that ripples, which is common.
         if self.of == Of::Radius && series.iter().all(|s| s.wheel_balance.is_empty()) {

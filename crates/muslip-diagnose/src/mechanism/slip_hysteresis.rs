@@ -1,8 +1,8 @@
 //! Rising slip and falling slip follow different curves, whatever the rate.
 
 use super::{
-    Balance, Compensation, Context, Describe, Evidence, Example, Guide, Id, Kind, Law, Mechanism,
-    Memory, Parameter, Reported, Sign, Stage, State,
+    Balance, Compensation, Context, Describe, Example, Guide, Id, Kind, Law, Mechanism, Memory,
+    Parameter, Reported, Residuals, Sign, Stage, State,
 };
 use crate::number::Number;
 use crate::series::Series;
@@ -27,7 +27,7 @@ impl Describe for SlipHysteresis {
         &self,
         _context: &Context,
         _series: &[Series],
-        _evidence: &[Evidence],
+        _evidence: &[Residuals],
     ) -> Vec<Vec<f64>> {
         [0.003, 0.012, 0.04].iter().map(|w| vec![0.0, *w]).collect()
     }

@@ -2,8 +2,8 @@
 
 use super::guide::runs;
 use super::{
-    Alias, Balance, Compensation, Context, Describe, Evidence, Example, Guide, Id, Kind, Law,
-    Mechanism, Memory, Parameter, Reported, Sign, Stage, State,
+    Alias, Balance, Compensation, Context, Describe, Example, Guide, Id, Kind, Law, Mechanism,
+    Memory, Parameter, Reported, Residuals, Sign, Stage, State,
 };
 use crate::number::Number;
 use crate::series::Series;
@@ -23,7 +23,7 @@ struct Scan {
 impl Scan {
     const BINS: usize = 96;
 
-    fn new(context: &Context, series: &[Series], evidence: &[Evidence]) -> Self {
+    fn new(context: &Context, series: &[Series], evidence: &[Residuals]) -> Self {
         let bin = (context.distance / Self::BINS as f64).max(1e-6);
         let mut scan = Self {
             bin,
@@ -116,7 +116,12 @@ impl Describe for SurfacePatch {
         }
         all
     }
-    fn starts(&self, context: &Context, series: &[Series], evidence: &[Evidence]) -> Vec<Vec<f64>> {
+    fn starts(
+        &self,
+        context: &Context,
+        series: &[Series],
+        evidence: &[Residuals],
+    ) -> Vec<Vec<f64>> {
         let fresh = Scan::new(context, series, evidence);
         let mut starts: Vec<Vec<f64>> = Vec::new();
         // What differs over most of the track hides shorter stretches.

@@ -2,8 +2,8 @@
 
 use super::guide::runs;
 use super::{
-    Alias, Balance, Compensation, Context, Describe, Evidence, Example, Guide, Id, Kind, Law,
-    Mechanism, Memory, Parameter, Reported, Sign, Stage, State,
+    Alias, Balance, Compensation, Context, Describe, Example, Guide, Id, Kind, Law, Mechanism,
+    Memory, Parameter, Reported, Residuals, Sign, Stage, State,
 };
 use crate::number::Number;
 use crate::series::Series;
@@ -58,7 +58,7 @@ impl Describe for ThermalFade {
         &self,
         context: &Context,
         _series: &[Series],
-        _evidence: &[Evidence],
+        _evidence: &[Residuals],
     ) -> Vec<Vec<f64>> {
         [0.2, 0.6, 2.0, 6.0, 20.0, 60.0]
             .iter()

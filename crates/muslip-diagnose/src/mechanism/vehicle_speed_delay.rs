@@ -3,8 +3,8 @@
 use super::guide::runs;
 use super::speed_delay::{parameters, report, shift, starts, statement};
 use super::{
-    Alias, Balance, Compensation, Context, Describe, Evidence, Example, Guide, Id, Kind, Law,
-    Mechanism, Memory, Parameter, Reported, Sign, Speed, Stage, State,
+    Alias, Balance, Compensation, Context, Describe, Example, Guide, Id, Kind, Law, Mechanism,
+    Memory, Parameter, Reported, Residuals, Sign, Speed, Stage, State,
 };
 use crate::number::Number;
 use crate::series::Series;
@@ -35,7 +35,7 @@ impl Describe for VehicleSpeedDelay {
         &self,
         context: &Context,
         _series: &[Series],
-        _evidence: &[Evidence],
+        _evidence: &[Residuals],
     ) -> Vec<Vec<f64>> {
         starts(context)
     }

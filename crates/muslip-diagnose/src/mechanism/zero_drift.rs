@@ -1,8 +1,8 @@
 //! The drag channel's zero moves with time.
 
 use super::{
-    Balance, Compensation, Context, Describe, Evidence, Example, Guide, Id, Kind, Law, Mechanism,
-    Memory, Parameter, Reported, Sign, Stage, State,
+    Balance, Compensation, Context, Describe, Example, Guide, Id, Kind, Law, Mechanism, Memory,
+    Parameter, Reported, Residuals, Sign, Stage, State,
 };
 use crate::number::Number;
 use crate::series::Series;
@@ -82,7 +82,7 @@ impl Describe for ZeroDrift {
         &self,
         context: &Context,
         _series: &[Series],
-        _evidence: &[Evidence],
+        _evidence: &[Residuals],
     ) -> Vec<Vec<f64>> {
         let time = if self.form.cumulative() {
             context.total_time

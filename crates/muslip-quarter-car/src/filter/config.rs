@@ -3,7 +3,6 @@ use muslip::real::Real;
 use muslip_laws::Burckhardt;
 
 use super::error::{ConfigError, ConfigParameter};
-use super::five_state::Filter;
 use super::model::{Road, Vehicle};
 use super::state::StateStd;
 
@@ -105,15 +104,6 @@ impl<T: Real> Config<T> {
             refuses_repeats: true,
             keeps_slip_positive: true,
         }
-    }
-
-    /// The filter, at its start.
-    ///
-    /// # Errors
-    /// [`ConfigError`] naming the first field that is outside its range.
-    pub fn build(self) -> Result<Filter<T>, ConfigError> {
-        self.check()?;
-        Ok(Filter::new(self))
     }
 
     /// Whether every field is within its range.

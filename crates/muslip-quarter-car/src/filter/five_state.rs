@@ -2,7 +2,7 @@ use muslip::filter::Decision;
 use muslip::real::Real;
 
 use super::config::Config;
-use super::error::{Input, StepError};
+use super::error::{ConfigError, Input, StepError};
 use super::model::{Model, Motion, Road};
 use super::state::{Covariance, Estimate, State, StateStd};
 use super::update::{Channel, Fusion, Measurement, corrected};
@@ -27,9 +27,20 @@ const GATE_PATIENCE: u8 = 5;
 /// Smallest mass that a correction leaves, as a share of the mass at the start.
 const SMALLEST_MASS: f64 = 0.1;
 
+impl<T: Real> Config<T> {
+    /// The filter, at its start.
+    ///
+    /// # Errors
+    /// [`ConfigError`] naming the first field that is outside its range.
+    pub fn build(self) -> Result<Filter<T>, ConfigError> {
+        self.check()?;
+        Ok(Filter::new(self))
+    }
+}
+
 impl<T: Real> Filter<T> {
     /// The configuration was validated by [`Config::build`].
-    pub(super) fn new(config: Config<T>) -> Self {
+    fn new(config: Config<T>) -> Self {
         let v = config.initial_vehicle_speed_m_s;
         let state = State {
             wheel_speed_rad_s: v / config.vehicle.radius_m,

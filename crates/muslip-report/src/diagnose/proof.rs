@@ -1,7 +1,7 @@
 //! How much better the repaired model predicts: a section of the report.
 
 use muslip_analysis::diagnose::wording::{estimate, significant, spoken, with_unit};
-use muslip_diagnose::outcome::{Diagnosis, Estimate, Role, Score};
+use muslip_diagnose::outcome::{Diagnosis, Role, Score, ValueAndStd};
 
 use super::blocks::{section, table};
 use crate::page::{Block, Section};
@@ -98,8 +98,8 @@ fn channel_unit(channel: &str) -> &'static str {
 }
 
 /// The law's parameters: alone before repaired, the peak before its slip.
-fn base_in_order(diagnosis: &Diagnosis) -> impl Iterator<Item = (&str, &Estimate)> {
-    let mut rows: Vec<(&str, &Estimate)> = diagnosis
+fn base_in_order(diagnosis: &Diagnosis) -> impl Iterator<Item = (&str, &ValueAndStd)> {
+    let mut rows: Vec<(&str, &ValueAndStd)> = diagnosis
         .base
         .iter()
         .map(|(name, value)| (name.as_str(), value))

@@ -1,9 +1,10 @@
 use core::fmt;
 
-use super::estimate::{Estimate, SLIPS};
-use super::filter::EfficientFilter;
 use crate::filter::mu_slip::{Range, State};
 use crate::real::Real;
+
+/// Range that sp is held in: where the bins lie, and an octave beyond.
+pub(super) const SLIPS: (f64, f64) = (1.0 / 64.0, 2.0);
 
 /// Configuration of the efficient estimator.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -54,11 +55,8 @@ impl<T: Real> Config<T> {
         }
     }
 
-    /// The filter, at its start.
-    ///
-    /// # Errors
-    /// [`ConfigError`] naming the first field that is outside its range.
-    pub fn build(self) -> Result<EfficientFilter<T>, ConfigError> {
+    /// Whether every field is within its range.
+    pub(super) fn check(&self) -> Result<(), ConfigError> {
         let refuse = |parameter| Err(ConfigError::OutOfRange(parameter));
         let start = self.initial_state;
         let (least, most) = SLIPS;
@@ -75,7 +73,7 @@ impl<T: Real> Config<T> {
         {
             return refuse(ConfigParameter::Memory);
         }
-        Ok(EfficientFilter::new(self, Estimate::start(&self)))
+        Ok(())
     }
 }
 

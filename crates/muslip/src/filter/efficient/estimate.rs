@@ -6,8 +6,6 @@ use super::sums::Sums;
 use crate::filter::mu_slip::{Covariance, State};
 use crate::real::Real;
 
-/// Range that sp is held in: where the bins lie, and an octave beyond.
-pub(super) const SLIPS: (f64, f64) = (1.0 / 64.0, 2.0);
 /// Precision of the prior on ln sp: a standard deviation of 0.7.
 const PRIOR_PRECISION: f64 = 2.0;
 /// Samples that the declared noise counts as when its level is learnt.

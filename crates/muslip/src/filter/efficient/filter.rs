@@ -1,4 +1,4 @@
-use super::config::Config;
+use super::config::{Config, ConfigError};
 use super::estimate::{Estimate, Expected};
 use crate::filter::mu_slip::{Covariance, Fusion, Input, State, UpdateError};
 use crate::filter::{Decision, Estimator, FrictionMeasurement, PeakEstimate};
@@ -27,11 +27,21 @@ pub struct EfficientFilter<T> {
     estimate: Estimate<T>,
 }
 
-impl<T: Real> EfficientFilter<T> {
-    pub(super) fn new(config: Config<T>, estimate: Estimate<T>) -> Self {
-        Self { config, estimate }
+impl<T: Real> Config<T> {
+    /// The filter, at its start.
+    ///
+    /// # Errors
+    /// [`ConfigError`] naming the first field that is outside its range.
+    pub fn build(self) -> Result<EfficientFilter<T>, ConfigError> {
+        self.check()?;
+        Ok(EfficientFilter {
+            config: self,
+            estimate: Estimate::start(&self),
+        })
     }
+}
 
+impl<T: Real> EfficientFilter<T> {
     /// The configuration it was built from.
     pub fn config(&self) -> &Config<T> {
         &self.config

@@ -1,9 +1,9 @@
 //! What a sample does to the estimate.
 
 use super::bins::{Bins, Term};
-use super::config::Config;
+use super::config::{Config, SLIPS};
 use super::estimate::{
-    DECLARED_NOISE_SAMPLES, Estimate, FIRST_RENEWAL, LARGEST_USUAL_FACTOR, SLIPS, SUSPECT, moved,
+    DECLARED_NOISE_SAMPLES, Estimate, FIRST_RENEWAL, LARGEST_USUAL_FACTOR, SUSPECT, moved,
 };
 use super::judge::{MOST_SAMPLES, judge};
 use super::sums::Sums;

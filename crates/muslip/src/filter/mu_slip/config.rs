@@ -1,6 +1,5 @@
 use super::error::{ConfigError, ConfigParameter};
-use super::filter::MuSlipFilter;
-use super::state::{Covariance, Estimate, State};
+use super::state::{Covariance, State};
 use crate::real::Real;
 
 /// Range of tyres that the filter starts from: at the high end, with a standard deviation as large.
@@ -110,11 +109,8 @@ impl<T: Real> Config<T> {
         }
     }
 
-    /// The filter, at its start.
-    ///
-    /// # Errors
-    /// [`ConfigError`] naming the first field that is outside its range.
-    pub fn build(self) -> Result<MuSlipFilter<T>, ConfigError> {
+    /// Whether every field is within its range.
+    pub(super) fn check(&self) -> Result<(), ConfigError> {
         let refuse = |parameter| Err(ConfigError::OutOfRange(parameter));
         if !self.initial_state.is_physical() {
             return refuse(ConfigParameter::InitialState);
@@ -129,13 +125,7 @@ impl<T: Real> Config<T> {
         if self.nis_gate.is_some_and(|gate| !passes_zero(gate)) {
             return refuse(ConfigParameter::NisGate);
         }
-        Ok(MuSlipFilter::new(
-            self,
-            Estimate {
-                state: self.initial_state,
-                covariance: self.initial_covariance,
-            },
-        ))
+        Ok(())
     }
 }
 

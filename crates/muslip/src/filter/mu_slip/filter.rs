@@ -1,5 +1,5 @@
 use super::config::{Config, CovarianceForm};
-use super::error::{Input, UpdateError};
+use super::error::{ConfigError, Input, UpdateError};
 use super::state::{Covariance, Estimate, State};
 use super::update::{Choices, Fusion, Inputs, lean};
 use crate::filter::{Decision, Estimator, FrictionMeasurement, PeakEstimate};
@@ -19,8 +19,23 @@ pub struct MuSlipFilter<T> {
     lean_above: T,
 }
 
+impl<T: Real> Config<T> {
+    /// The filter, at its start.
+    ///
+    /// # Errors
+    /// [`ConfigError`] naming the first field that is outside its range.
+    pub fn build(self) -> Result<MuSlipFilter<T>, ConfigError> {
+        self.check()?;
+        let start = Estimate {
+            state: self.initial_state,
+            covariance: self.initial_covariance,
+        };
+        Ok(MuSlipFilter::new(self, start))
+    }
+}
+
 impl<T: Real> MuSlipFilter<T> {
-    pub(super) fn new(config: Config<T>, estimate: Estimate<T>) -> Self {
+    fn new(config: Config<T>, estimate: Estimate<T>) -> Self {
         let as_the_article = config.pseudonoise
             && config.covariance_form == CovarianceForm::Short
             && config.nis_gate.is_none();

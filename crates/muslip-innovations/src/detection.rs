@@ -22,7 +22,7 @@ pub enum Band {
 
 /// How the evidence is weighed.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Evidence<T> {
+pub struct Detection<T> {
     /// Innovations in a window of the fast band, >= 8.
     pub fast_window: u16,
     /// Innovations summed into one of the slow band, >= 1.
@@ -34,7 +34,7 @@ pub struct Evidence<T> {
     pub false_alarm_probability: T,
 }
 
-impl<T: Real> Evidence<T> {
+impl<T: Real> Detection<T> {
     /// 256 innovations, blocks of 32, 64 blocks, a probability of 1e-6.
     ///
     /// At 1 kHz windows of 0.26 s and 2.05 s: three balances close 47,500 in an hour in which all are formed, so one
@@ -178,13 +178,13 @@ pub(crate) struct BandLimits<T> {
 }
 
 impl<T: Real> BandLimits<T> {
-    pub(crate) fn new(evidence: &Evidence<T>) -> Self {
-        let probability = evidence.false_alarm_probability;
+    pub(crate) fn new(detection: &Detection<T>) -> Self {
+        let probability = detection.false_alarm_probability;
         Self {
-            fast: Limits::new(evidence.fast_window, probability),
-            slow: Limits::new(evidence.slow_window, probability),
-            block: evidence.slow_block,
-            per_block: T::ONE / T::from_f64(f64::from(evidence.slow_block)).sqrt(),
+            fast: Limits::new(detection.fast_window, probability),
+            slow: Limits::new(detection.slow_window, probability),
+            block: detection.slow_block,
+            per_block: T::ONE / T::from_f64(f64::from(detection.slow_block)).sqrt(),
         }
     }
 }
