@@ -2,8 +2,8 @@
 
 use muslip_diagnose::mechanism::Id;
 use muslip_diagnose::outcome::{
-    BeforeAfter, ChainFinding, Diagnosis, Estimate, Figure, LookedFor, MinimumDetectable,
-    NamedMechanism, Unexplained, Verdict,
+    BeforeAfter, ChainFinding, Diagnosis, LookedFor, MinimumDetectable, NamedMechanism,
+    ReportedParameter, Unexplained, ValueAndStd, Verdict,
 };
 
 use crate::wording::{decimals_for, plus_minus};
@@ -85,7 +85,7 @@ pub fn with_unit(number: String, unit: &str) -> String {
 
 /// A reported figure: name, value, 1-sigma, unit.
 #[must_use]
-pub fn figure(figure: &Figure) -> String {
+pub fn figure(figure: &ReportedParameter) -> String {
     format!(
         "{} {}",
         spoken(&figure.name),
@@ -95,7 +95,7 @@ pub fn figure(figure: &Figure) -> String {
 
 /// A parameter of the base law.
 #[must_use]
-pub fn estimate(estimate: &Estimate) -> String {
+pub fn estimate(estimate: &ValueAndStd) -> String {
     quantity(estimate.value, estimate.std, "")
 }
 

@@ -9,9 +9,9 @@ use host_sim::Scenario;
 use muslip_diagnose::campaign::Rig;
 use muslip_diagnose::mechanism::{Before, Context, Id};
 use muslip_diagnose::outcome::{
-    Alternative, BeforeAfter, ChainFinding, ChainWord, ChannelNoise, Diagnosis, Estimate, Evidence,
-    Fault, Figure, Fit, Interval, LookedFor, MinimumDetectable, NamedMechanism, Recording, Region,
-    Role, Score, Trace, Unexplained, Verdict,
+    Alternative, BeforeAfter, ChainFinding, ChainWord, ChannelNoise, Diagnosis, Evidence, Fault,
+    Fit, Interval, LookedFor, MinimumDetectable, NamedMechanism, Recording, Region,
+    ReportedParameter, Role, Score, Trace, Unexplained, ValueAndStd, Verdict,
 };
 use muslip_diagnose::repaired::{
     Correction, Domain, KnownRecording, NoiseModel, Predicting, Repaired, RepairedParameter,
@@ -274,14 +274,14 @@ pub fn partly_explained() -> Diagnosis {
         base: BTreeMap::from([
             (
                 "peak_friction".to_owned(),
-                Estimate {
+                ValueAndStd {
                     value: 0.8421,
                     std: 0.0021,
                 },
             ),
             (
                 "critical_slip".to_owned(),
-                Estimate {
+                ValueAndStd {
                     value: 0.1412,
                     std: 0.0013,
                 },
@@ -341,7 +341,7 @@ pub fn partly_explained() -> Diagnosis {
                 balance: "tyre",
                 statement: "the drag channel passes a first-order filter of 10.1 ms".into(),
                 equation: "time_constant * d(reading)/dt + reading = drag".into(),
-                parameters: vec![Figure {
+                parameters: vec![ReportedParameter {
                     name: "time_constant".into(),
                     value: 0.0101,
                     std: 0.0004,
@@ -373,7 +373,7 @@ pub fn partly_explained() -> Diagnosis {
                 balance: "wheel",
                 statement: "the wheel's inertia is 1.338 kg m2".into(),
                 equation: "inertia * d(omega)/dt = R * drag - brake_torque".into(),
-                parameters: vec![Figure {
+                parameters: vec![ReportedParameter {
                     name: "inertia".into(),
                     value: 1.338,
                     std: 0.012,
