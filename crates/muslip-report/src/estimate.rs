@@ -57,7 +57,7 @@ pub fn of_estimate(
             "{}, estimator {}, range {}",
             recording.display(),
             result.estimator.word(),
-            range_word(result.options.range)
+            range_word(result.range)
         ),
         verdict: estimate_sentence(result),
         tone,

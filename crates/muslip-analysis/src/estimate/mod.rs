@@ -55,8 +55,8 @@ pub struct EstimateOptions {
     /// Which filter; `None`: the efficient one, or the article's where a model is compensated that the
     /// efficient one cannot stand behind (a low-pass filter on the force).
     pub estimator: Option<EstimatorKind>,
-    /// Where it starts.
-    pub range: Range,
+    /// Range of tyres that it starts from; `None`: that of the recording ([`Survey::range`]).
+    pub range: Option<Range>,
 }
 
 /// What came out.
@@ -66,6 +66,8 @@ pub struct EstimateResult {
     pub options: EstimateOptions,
     /// Which filter estimated.
     pub estimator: EstimatorKind,
+    /// Range of tyres that it started from.
+    pub range: Range,
     /// The final estimate.
     pub peak: PeakEstimate<f64>,
     /// Samples that were used.
@@ -154,11 +156,10 @@ pub fn estimate<W: Write>(
         None if filtered => EstimatorKind::Article,
         None => EstimatorKind::Efficient,
     };
+    let range = options.range.unwrap_or(survey.range);
     let filter = match kind {
-        EstimatorKind::Article => Filter::Article(Config::for_range(options.range).build()?),
-        EstimatorKind::Efficient => {
-            Filter::Efficient(efficient::Config::for_range(options.range).build()?)
-        }
+        EstimatorKind::Article => Filter::Article(Config::for_range(range).build()?),
+        EstimatorKind::Efficient => Filter::Efficient(efficient::Config::for_range(range).build()?),
     };
     let mut result = run(
         filter,
@@ -345,6 +346,7 @@ fn run<W: Write>(
     Ok(EstimateResult {
         options,
         estimator: EstimatorKind::Article,
+        range: options.range.unwrap_or(survey.range),
         peak: filter.peak(),
         used,
         skipped,
@@ -400,7 +402,8 @@ impl EstimateResult {
         let mut object = json!({
             "schema": "muslip.estimate/1",
             "estimator": self.estimator.word(),
-            "range": range_word(self.options.range),
+            "range": range_word(self.range),
+            "range_source": if self.options.range.is_some() { "option" } else { "recording" },
             "peak_friction": Quantity { value: peak.peak_friction, std: peak.peak_friction_std },
             "critical_slip": Quantity { value: peak.critical_slip, std: peak.critical_slip_std },
             "correlation": peak.correlation,

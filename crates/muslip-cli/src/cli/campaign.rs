@@ -25,7 +25,7 @@ use super::terminal::Terminal;
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  \
 muslip campaign --rig rig.toml --out campaign runs/*.csv\n  \
-muslip campaign --rig rig.toml --range automotive --out campaign --json runs/*.csv")]
+muslip campaign --rig rig.toml --out campaign --json runs/*.csv")]
 pub(super) struct Arguments {
     /// Rig file (TOML).
     #[arg(long, value_name = "RIG.toml")]
@@ -156,7 +156,7 @@ fn command(arguments: &Arguments) -> String {
         .map(|path| path.display().to_string())
         .collect();
     format!(
-        "muslip campaign --rig {} {} {}",
+        "muslip campaign --rig {} {}{}",
         arguments.rig.display(),
         arguments.choices.words(),
         recordings.join(" ")

@@ -7,7 +7,7 @@ use clap::{Args, ValueEnum};
 use muslip::filter::mu_slip::Range;
 use muslip_analysis::estimate::{
     EstimateError, EstimateOptions, EstimateResult, EstimatorKind, TraceFormat, TraceWriter,
-    estimate,
+    estimate, range_word,
 };
 use muslip_analysis::wording::{
     consistency_sentence, estimate_sentence, model_sentences, noise_sentence,
@@ -33,7 +33,7 @@ const PRINTED: &str = "-";
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  \
 muslip estimate --rig rig.toml run.csv\n  \
-muslip estimate --rig rig.toml --range automotive --report run.html run.csv\n  \
+muslip estimate --rig rig.toml --report run.html run.csv\n  \
 muslip estimate --rig rig.toml --trace trace.csv --json run.csv\n  \
 muslip estimate --rig rig.toml --model found/model.toml run.csv")]
 pub(super) struct Arguments {
@@ -68,12 +68,12 @@ pub(super) struct Arguments {
 /// How to estimate; the campaign has the same.
 #[derive(Debug, Args)]
 pub(super) struct Choices {
-    /// Where the filter starts: peak friction 0.6 (aircraft) or 1.0 (automotive), each give or take
-    /// itself.
-    #[arg(long, value_enum, default_value_t = RangeChoice::Aircraft)]
-    range: RangeChoice,
-    /// Which filter estimates; efficient unless a model with a low-pass filter on the force is
-    /// compensated.
+    /// Tyres to start from: peak friction 0.6 ± 0.6 (aircraft) or 1.0 ± 1.0 (automotive). Found from the
+    /// recording where it is not given.
+    #[arg(long, value_enum)]
+    range: Option<RangeChoice>,
+    /// The estimator; `efficient` where it is not given, `article` where `--model` has a low-pass filter on
+    /// the force.
     #[arg(long, value_enum)]
     estimator: Option<EstimatorChoice>,
 }
@@ -85,18 +85,20 @@ impl Choices {
                 EstimatorChoice::Article => EstimatorKind::Article,
                 EstimatorChoice::Efficient => EstimatorKind::Efficient,
             }),
-            range: self.range.into(),
+            range: self.range.map(Range::from),
         }
     }
 
-    /// The choices as arguments.
+    /// The choices as arguments, each with a space after it.
     pub(super) fn words(&self) -> String {
         let options = self.options();
-        let range = muslip_analysis::estimate::range_word(options.range);
-        match options.estimator {
-            Some(estimator) => format!("--range {range} --estimator {}", estimator.word()),
-            None => format!("--range {range}"),
-        }
+        let range = options
+            .range
+            .map(|range| format!("--range {} ", range_word(range)));
+        let estimator = options
+            .estimator
+            .map(|estimator| format!("--estimator {} ", estimator.word()));
+        range.unwrap_or_default() + &estimator.unwrap_or_default()
     }
 }
 
@@ -255,7 +257,7 @@ impl Job<'_> {
         format!(
             "muslip estimate --rig {} --range {} --estimator {} {model}{}",
             self.rig_path.display(),
-            muslip_analysis::estimate::range_word(self.options.range),
+            range_word(result.range),
             result.estimator.word(),
             self.recording_path.display()
         )
@@ -315,6 +317,19 @@ fn trace_failure(path: &Path, error: io::Error) -> Failure {
     }
 }
 
+/// Which estimator ran and which range it started from.
+fn estimator_words(result: &EstimateResult) -> String {
+    let from = match result.options.range {
+        Some(_) => "given",
+        None => "found from the recording",
+    };
+    format!(
+        "{}; range {} ({from})",
+        result.estimator.word(),
+        range_word(result.range)
+    )
+}
+
 /// The result below its headline.
 pub(super) fn tell(result: &EstimateResult, terminal: &mut Terminal) -> Result<(), Failure> {
     let peak = &result.peak;
@@ -339,6 +354,7 @@ pub(super) fn tell(result: &EstimateResult, terminal: &mut Terminal) -> Result<(
         ),
         ("correlation", format!("{:.3}", peak.correlation)),
         ("samples", format!("{} used, {skipped}", result.used)),
+        ("estimator", estimator_words(result)),
     ])?;
     terminal.line("")?;
     for sentence in result.model.iter().flat_map(model_sentences) {
