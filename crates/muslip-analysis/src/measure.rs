@@ -1,4 +1,4 @@
-//! From the rows of a recording to measurements of friction at a slip: what counts, what is skipped and
+//! Rows of a recording as measurements of friction at a slip: which are used, which are skipped and
 //! why, and how noisy a measurement is.
 
 use muslip::filter::mu_slip::Range;
@@ -152,7 +152,7 @@ pub struct Survey {
 
 impl Survey {
     /// Goes through a recording once for its median normal force, the range of its tyre and, where the rig
-    /// file declares no drag noise, the noise of friction. `progress` is told the bytes gone through.
+    /// file declares no drag noise, the noise of friction. `progress` receives the bytes read so far.
     ///
     /// # Errors
     /// [`InputError`] if the recording is malformed anywhere.
@@ -220,7 +220,7 @@ pub struct Measurement {
 }
 
 /// Goes through a recording and hands on every row that counts as a measurement, in file order; returns
-/// how many rows were skipped. `progress` is told the bytes gone through.
+/// how many rows were skipped. `progress` receives the bytes read so far.
 ///
 /// # Errors
 /// [`InputError`] if the recording is malformed anywhere, or what `take` answers.
@@ -257,7 +257,7 @@ pub fn for_each_measurement<E: From<InputError>>(
     outcome.map(|()| skipped)
 }
 
-/// Goes through all rows of a recording. `progress` is told the bytes gone through.
+/// Goes through all rows of a recording. `progress` receives the bytes read so far.
 ///
 /// # Errors
 /// [`InputError`] if the recording is malformed anywhere.

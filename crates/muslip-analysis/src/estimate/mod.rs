@@ -96,7 +96,7 @@ pub enum EstimateError {
     /// The same of the efficient estimator.
     #[error(transparent)]
     EfficientConfig(#[from] efficient::ConfigError),
-    /// The model's figures are none that can be compensated.
+    /// The model's parameters cannot be compensated.
     #[error("the model cannot be compensated: {0}")]
     Model(String),
     /// The trace could not be written.
@@ -108,7 +108,7 @@ pub enum EstimateError {
 ///
 /// `model` is what a diagnosis found: of its mechanisms those are compensated that can be, sample by
 /// sample, and where the rig file declares no drag noise the model's counts. `trace` takes the estimate
-/// after every used sample. `progress` is told the bytes gone through, of twice the recording's length.
+/// after every used sample. `progress` receives the bytes read so far, of twice the recording's length.
 ///
 /// # Errors
 /// [`EstimateError::Input`] for a malformed recording or one without a usable sample,

@@ -18,10 +18,10 @@ use super::failure::Failure;
 use super::progress::Progress;
 use super::terminal::Terminal;
 
-/// Estimate many recordings of one rig and compare them: a page side by side, a page each.
+/// Estimate many recordings of one rig and compare them: one overview page, one report per run.
 ///
-/// Writes index.html, sortable, with the runs that stand out marked, and the report of every run beside
-/// it.
+/// Writes index.html, a sortable table in which the runs that stand out are marked, and the report of every
+/// run.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  \
 muslip campaign --rig rig.toml --out campaign runs/*.csv\n  \
@@ -32,16 +32,16 @@ pub(super) struct Arguments {
     rig: PathBuf,
     #[command(flatten)]
     choices: Choices,
-    /// Folder for the pages; made if it is not there.
+    /// Folder for the pages; created if missing.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
-    /// Also write the figures of index.html for a document, into DIR/figures.
+    /// Also write the plots of index.html as image files, into DIR/figures.
     #[arg(long, value_enum)]
     format: Option<FigureFormat>,
-    /// Print one JSON object and nothing else; files are written all the same.
+    /// Print one JSON object and nothing else; the files are written as well.
     #[arg(long)]
     json: bool,
-    /// The recordings (CSV), one file a run.
+    /// The recordings (CSV), one file per run.
     #[arg(value_name = "RUN.csv", required = true)]
     recordings: Vec<PathBuf>,
 }

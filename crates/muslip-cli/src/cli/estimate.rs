@@ -27,9 +27,9 @@ const PRINTED: &str = "-";
 
 /// Estimate peak friction and the slip of the peak from one recording, sample by sample.
 ///
-/// Every row with finite values, a vehicle speed of at least 0.5 m/s, a normal force of at least 2 % of
-/// the recording's median and a slip between 0 and 1 (with a margin of 0.05 for noise) is a measurement;
-/// others are skipped and counted.
+/// A row is used where its values are finite, the vehicle speed is at least 0.5 m/s, the normal force is at
+/// least 2 % of the recording's median and the slip is between 0 and 1 (with a margin of 0.05 for noise).
+/// Other rows are skipped and counted.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  \
 muslip estimate --rig rig.toml run.csv\n  \
@@ -42,19 +42,19 @@ pub(super) struct Arguments {
     rig: PathBuf,
     #[command(flatten)]
     choices: Choices,
-    /// Compensate what a diagnosis found, sample by sample: `model.toml` as `diagnose` writes it. Effects
-    /// that can be compensated are radius, delay, lag, zero drift, crosstalk, load and speed
-    /// sensitivity, relaxation and tread temperature; others are named and left.
+    /// Compensate the effects that a diagnosis found, sample by sample: the `model.toml` that `diagnose`
+    /// wrote. Compensated are radius, delay, lag, zero drift, crosstalk, load and speed sensitivity,
+    /// relaxation and tread temperature; other effects are listed and not compensated.
     #[arg(long, value_name = "MODEL.toml")]
     model: Option<PathBuf>,
     /// Write the estimate after every sample: CSV, or JSON where the name ends in .json or .jsonl; `-`
-    /// prints it as CSV in place of the words.
+    /// prints CSV on standard output instead of the summary.
     #[arg(long, value_name = "TRACE.csv")]
     trace: Option<PathBuf>,
     /// Write a report with plots.
     #[arg(long, value_name = "OUT.html")]
     report: Option<PathBuf>,
-    /// Also write the report's figures for a document, into the folder OUT-figures beside it.
+    /// Also write the report's plots as image files, into the folder OUT-figures beside it.
     #[arg(long, value_enum, requires = "report")]
     format: Option<FigureFormat>,
     /// Print one JSON object and nothing else.
@@ -121,9 +121,9 @@ impl From<RangeChoice> for Range {
 /// `--estimator`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum EstimatorChoice {
-    /// The article's extended Kalman filter: three times the noise, pseudonoise.
+    /// Extended Kalman filter of Rudd's article: noise inflated three times, pseudonoise.
     Article,
-    /// As accurate as a batch fit by maximum likelihood; learns the noise, rejects outliers.
+    /// Recursive maximum likelihood, as accurate as a batch fit; learns the noise, rejects outliers.
     Efficient,
 }
 
@@ -131,7 +131,7 @@ pub(super) fn run(arguments: &Arguments, terminal: &mut Terminal) -> Result<(), 
     let trace_is_printed = arguments.trace.as_deref() == Some(Path::new(PRINTED));
     if trace_is_printed && arguments.json {
         return Err(Failure::Usage(
-            "--trace - and --json would both print: give one of them a file".into(),
+            "--trace - and --json both write to standard output: give --trace a file name".into(),
         ));
     }
     let job = Job {
@@ -183,7 +183,7 @@ impl Job<'_> {
         self.run_reporting(&mut |bytes| progress.done(bytes))
     }
 
-    /// As [`Job::run`]; `progress` is told the bytes gone through, of twice the recording's length.
+    /// As [`Job::run`]; `progress` receives the bytes read so far, of twice the recording's length.
     pub(super) fn run_reporting(
         &self,
         progress: &mut dyn FnMut(u64),
