@@ -106,7 +106,7 @@ impl Scenario {
     }
 
     /// Runs the rig under a repaired model and returns the rows, in the order of [`Scenario::channels`]. The noise
-    /// is the model's. `progress` is told the rows done.
+    /// is the model's. `progress` receives the rows done.
     ///
     /// # Errors
     /// [`ModelRunError`].

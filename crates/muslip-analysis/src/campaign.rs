@@ -57,7 +57,7 @@ pub struct Campaign {
     pub runs: Vec<Run>,
     /// For each run, in what it stands out; empty where in nothing.
     pub stands_out: Vec<Vec<&'static str>>,
-    /// How many runs do not bear out their uncertainty, where that is most of them.
+    /// How many runs are overconfident, where that is most of them.
     pub overconfident: usize,
     /// Median peak friction and the robust standard deviation of the runs about it.
     pub peak_friction: (f64, f64),
@@ -130,8 +130,8 @@ impl Campaign {
         let common = match self.overconfident {
             0 => String::new(),
             many => format!(
-                " The measurements of {many} do not bear out their uncertainty: they share something that the filter \
-                 does not know."
+                " In {many} the measurements scatter more than the uncertainty allows: the model lacks something \
+                 that they have in common."
             ),
         };
         format!("{median}{standing_out}{common}")
@@ -223,7 +223,7 @@ mod tests {
         }
         let common = Campaign::new(runs.clone());
         assert_eq!((common.standing_out(), common.overconfident), (0, 5));
-        assert!(!common.is_quiet() && common.verdict().contains("of 5 do not bear out"));
+        assert!(!common.is_quiet() && common.verdict().contains("In 5 the measurements scatter"));
         // Too few to tell.
         runs.drain(..3);
         runs[2] = run(0.2, Verdict::Consistent);

@@ -8,7 +8,6 @@
 //! ```
 //! use std::fmt::Write as _;
 //!
-//! use muslip::filter::mu_slip::Range;
 //! use muslip_analysis::estimate::{EstimateOptions, TraceWriter, estimate};
 //! use muslip_analysis::fit::Curve;
 //! use muslip_recordings::recording::Recording;
@@ -34,7 +33,7 @@
 //! let run = folder.path().join("run.csv");
 //! std::fs::write(&run, rows)?;
 //!
-//! let options = EstimateOptions { estimator: None, range: Range::Automotive };
+//! let options = EstimateOptions { estimator: None, range: None };
 //! let no_trace = None::<&mut TraceWriter<Vec<u8>>>;
 //! let mut recording = Recording::open(&run)?;
 //! let result = estimate(&mut recording, &RigFile::read(&rig)?, options, None, no_trace, &mut |_| ())?;

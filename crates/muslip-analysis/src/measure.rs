@@ -1,18 +1,26 @@
-//! From the rows of a recording to measurements of friction at a slip: what counts, what is skipped and
+//! Rows of a recording as measurements of friction at a slip: which are used, which are skipped and
 //! why, and how noisy a measurement is.
 
-use muslip::sample::{RigSample, SampleError, SampleLimits, SlipFriction, slip_friction};
+use muslip::filter::mu_slip::Range;
+use muslip::sample::{SampleError, SampleLimits, SlipFriction, slip_friction};
 use muslip_recordings::input_error::InputError;
 use muslip_recordings::recording::{Channel, Recording, Required, Row};
-use muslip_recordings::rig_file::RigFile;
+use muslip_recordings::rig_file::{RigFile, Tyre};
 
 use crate::thin::Thinned;
 
 /// Rows between two calls of a progress report.
 const ROWS_A_REPORT: u64 = 4096;
 
-/// Most points that the noise of a recording is estimated from.
-const NOISE_POINTS: usize = 1 << 17;
+/// Most points that the noise of a recording and the range of its tyre are found from.
+const SURVEY_POINTS: usize = 1 << 17;
+
+/// Share of the samples that lie below the friction and the slip that a recording is taken to reach: the
+/// rest may be outliers.
+const REACHED_BY: f64 = 0.99;
+
+/// Peak friction from which a tyre is taken for a car's: midway between the starts of the two ranges.
+const CAR_TYRE_FROM: f64 = 0.8;
 
 /// Smallest friction noise that is believed, 1-sigma: a recording without any (a simulated one, say)
 /// must still leave the filter's arithmetic well-posed, and no load cell reads finer than this.
@@ -131,6 +139,9 @@ pub struct Survey {
     pub median_normal_force_n: f64,
     /// The noise of a friction measurement.
     pub noise: FrictionNoise,
+    /// Range of tyres that the recording's is in: by the friction that it reaches and, where it does not go
+    /// past the rig file's critical slip, by the rig file's peak friction.
+    pub range: Range,
     /// Rows of the recording.
     pub rows: u64,
     /// The first finite time in s; `NaN` where there is none.
@@ -140,8 +151,8 @@ pub struct Survey {
 }
 
 impl Survey {
-    /// Goes through a recording once for its median normal force and, where the rig file declares no
-    /// drag noise, for the noise of friction. `progress` is told the bytes gone through.
+    /// Goes through a recording once for its median normal force, the range of its tyre and, where the rig
+    /// file declares no drag noise, the noise of friction. `progress` receives the bytes read so far.
     ///
     /// # Errors
     /// [`InputError`] if the recording is malformed anywhere.
@@ -152,7 +163,7 @@ impl Survey {
     ) -> Result<Self, InputError> {
         let declared = rig.noise.get(Channel::DragForce.name()).copied();
         let mut normal_forces = Vec::new();
-        let mut samples = Thinned::new(NOISE_POINTS);
+        let mut samples = Thinned::new(SURVEY_POINTS);
         let mut rows = 0_u64;
         let (mut first_time_s, mut last_time_s) = (f64::NAN, f64::NAN);
         for_each_row(recording, progress, |row| {
@@ -167,22 +178,29 @@ impl Survey {
             if sample.normal_force_n.is_finite() {
                 normal_forces.push(sample.normal_force_n);
             }
-            if declared.is_none() {
-                samples.offer(|| sample);
-            }
+            samples.offer(|| sample);
         })?;
         let median_normal_force_n = median(&mut normal_forces).unwrap_or(f64::NAN);
         let limits = SampleLimits::for_median_normal_force(median_normal_force_n);
+        let mut points: Vec<SlipFriction<f64>> = samples
+            .items()
+            .iter()
+            .filter_map(|sample| slip_friction(sample, rig.wheel.radius_m, &limits).ok())
+            .collect();
         let noise = match declared {
             Some(drag_std_n) => FrictionNoise::Declared { drag_std_n },
-            None => FrictionNoise::Estimated {
-                friction_std: estimated_noise(samples.items(), rig.wheel.radius_m, &limits),
-            },
+            None => {
+                points.sort_by(|a, b| a.slip_ratio.total_cmp(&b.slip_ratio));
+                FrictionNoise::Estimated {
+                    friction_std: scatter_about_course(&points),
+                }
+            }
         };
         Ok(Self {
             limits,
             median_normal_force_n,
             noise,
+            range: range_of(&points, &rig.tyre),
             rows,
             first_time_s,
             mean_step_s: (last_time_s - first_time_s) / (rows as f64 - 1.0),
@@ -202,7 +220,7 @@ pub struct Measurement {
 }
 
 /// Goes through a recording and hands on every row that counts as a measurement, in file order; returns
-/// how many rows were skipped. `progress` is told the bytes gone through.
+/// how many rows were skipped. `progress` receives the bytes read so far.
 ///
 /// # Errors
 /// [`InputError`] if the recording is malformed anywhere, or what `take` answers.
@@ -239,7 +257,7 @@ pub fn for_each_measurement<E: From<InputError>>(
     outcome.map(|()| skipped)
 }
 
-/// Goes through all rows of a recording. `progress` is told the bytes gone through.
+/// Goes through all rows of a recording. `progress` receives the bytes read so far.
 ///
 /// # Errors
 /// [`InputError`] if the recording is malformed anywhere.
@@ -267,13 +285,30 @@ pub fn median(values: &mut [f64]) -> Option<f64> {
     Some(*median)
 }
 
-fn estimated_noise(samples: &[RigSample<f64>], radius_m: f64, limits: &SampleLimits<f64>) -> f64 {
-    let mut points: Vec<SlipFriction<f64>> = samples
-        .iter()
-        .filter_map(|sample| slip_friction(sample, radius_m, limits).ok())
-        .collect();
-    points.sort_by(|a, b| a.slip_ratio.total_cmp(&b.slip_ratio));
-    scatter_about_course(&points)
+/// The value that a share of values lies below; `None` of none.
+fn quantile(mut values: Vec<f64>, share: f64) -> Option<f64> {
+    let index = (share * values.len().checked_sub(1)? as f64) as usize;
+    let (_, value, _) = values.select_nth_unstable_by(index, f64::total_cmp);
+    Some(*value)
+}
+
+/// The range of tyres that measurements come from, `declared` being the rig file's tyre.
+fn range_of(points: &[SlipFriction<f64>], declared: &Tyre) -> Range {
+    let reached = |of: fn(&SlipFriction<f64>) -> f64| {
+        quantile(points.iter().map(of).collect(), REACHED_BY).unwrap_or(0.0)
+    };
+    let friction = reached(|point| point.friction);
+    let past_the_peak = reached(|point| point.slip_ratio) > declared.critical_slip;
+    let peak_friction = if past_the_peak {
+        friction
+    } else {
+        friction.max(declared.peak_friction)
+    };
+    if peak_friction > CAR_TYRE_FROM {
+        Range::Automotive
+    } else {
+        Range::Aircraft
+    }
 }
 
 /// 1-sigma of friction about its course over slip, for points in the order of slip.
@@ -355,6 +390,27 @@ mod tests {
             scatter_about_course(&noisy_points(0.0, 4000)),
             SMALLEST_FRICTION_STD
         );
+    }
+
+    #[test]
+    fn the_range_is_the_recording_s_and_short_of_the_peak_the_rig_file_s() {
+        let tyre = |peak_friction| Tyre {
+            peak_friction,
+            critical_slip: 0.15,
+            fixed: false,
+        };
+        let wet = noisy_points(0.04, 400);
+        let short_of_peak = &wet[..100];
+        let mut dry = wet.clone();
+        dry.iter_mut().for_each(|point| point.friction *= 3.0);
+        assert_eq!(range_of(&wet, &tyre(0.95)), Range::Aircraft);
+        assert_eq!(range_of(&dry, &tyre(0.4)), Range::Automotive);
+        assert_eq!(range_of(short_of_peak, &tyre(0.95)), Range::Automotive);
+        assert_eq!(range_of(short_of_peak, &tyre(0.4)), Range::Aircraft);
+        let mut outliers = wet;
+        outliers[7].friction = 1e300;
+        assert_eq!(range_of(&outliers, &tyre(0.95)), Range::Aircraft);
+        assert_eq!(range_of(&[], &tyre(0.4)), Range::Aircraft);
     }
 
     #[test]

@@ -1,4 +1,4 @@
-//! Results as an engineer would put them: the same sentences in the terminal and in reports.
+//! Sentences of the results, the same in the terminal and in reports.
 
 use muslip::filter::PeakEstimate;
 
@@ -14,7 +14,7 @@ pub fn plus_minus(value: f64, std: f64) -> String {
     format!("{value:.decimals$} \u{b1} {std:.decimals$}")
 }
 
-/// Decimals that show two digits of a 1-sigma figure, or one where the first of them is 4 or more.
+/// Decimals that show two digits of a standard deviation, or one where the first of them is 4 or more.
 pub fn decimals_for(std: f64) -> usize {
     if std.is_finite() && std > 0.0 {
         (1.0 - (2.5 * std).log10().floor()).clamp(0.0, 6.0) as usize
@@ -23,7 +23,7 @@ pub fn decimals_for(std: f64) -> usize {
     }
 }
 
-/// The answer of an estimate or a fit.
+/// Peak friction and critical slip of an estimate or a fit, in a sentence.
 pub fn verdict_sentence(peak: &PeakEstimate<f64>) -> String {
     let friction = plus_minus(peak.peak_friction, peak.peak_friction_std);
     let slip = plus_minus(peak.critical_slip, peak.critical_slip_std);
@@ -36,18 +36,18 @@ pub fn verdict_sentence(peak: &PeakEstimate<f64>) -> String {
     }
 }
 
-/// The answer of an estimate, with a word of warning where its uncertainty is not borne out.
+/// The same of an estimate, with a warning where the innovations contradict its uncertainty.
 pub fn estimate_sentence(result: &EstimateResult) -> String {
     let sentence = verdict_sentence(&result.peak);
     match result.consistency.verdict {
         Verdict::Overconfident => {
-            format!("{sentence} The measurements do not bear this uncertainty out.")
+            format!("{sentence} The measurements scatter more than this uncertainty allows.")
         }
         Verdict::Consistent | Verdict::Conservative => sentence,
     }
 }
 
-/// What the consistency tests say and what follows from it.
+/// Result and meaning of the consistency tests.
 pub fn consistency_sentence(consistency: &Consistency, estimator: EstimatorKind) -> String {
     let Consistency {
         mean_nis,
@@ -57,24 +57,24 @@ pub fn consistency_sentence(consistency: &Consistency, estimator: EstimatorKind)
         verdict,
     } = *consistency;
     let meaning = match (verdict, estimator) {
-        (Verdict::Consistent, _) => "the 1-sigma figures are borne out by the innovations",
+        (Verdict::Consistent, _) => "the innovations agree with the stated uncertainty",
         (Verdict::Conservative, EstimatorKind::Article) => {
-            "as always with the article's filter, which takes three times the measurement sigma and adds pseudonoise"
+            "expected of the article's filter, which inflates the measurement sigma three times and adds pseudonoise"
         }
         (Verdict::Conservative, EstimatorKind::Efficient) => {
-            "measurements lie nearer to the curve than the noise that was learnt, which is held above 0.15 times the declared variance"
+            "the measurements scatter less than declared, and the learnt variance is held above 0.15 times the declared one"
         }
         (Verdict::Overconfident, _) => {
-            "measurements lie further from the curve than their noise explains: another curve than the law's, or more noise than stated; do not trust the 1-sigma figures"
+            "the measurements scatter about the curve more than their noise explains: the tyre's curve has another shape, or the noise is larger than declared. Do not rely on the 1-sigma values"
         }
     };
     let colour = if whiteness_p >= WHITE_FROM {
         format!("Innovations are white (p = {whiteness_p:.2}).")
     } else {
-        "Innovations are correlated (p < 0.01): neighbouring samples share an error, such as a curve of another shape or filtered noise, which the 1-sigma figures do not include.".to_owned()
+        "Innovations are correlated (p < 0.01): neighbouring samples share an error (a tyre curve of another shape, or filtered noise) that the 1-sigma values do not include.".to_owned()
     };
     format!(
-        "{}: mean NIS {mean_nis:.3}, consistent from {nis_low:.3} to {nis_high:.3}; {meaning}. {colour}",
+        "{}: mean NIS {mean_nis:.3} (95 % band {nis_low:.3} to {nis_high:.3}); {meaning}. {colour}",
         capitalised(verdict.word())
     )
 }
@@ -96,7 +96,7 @@ pub fn model_sentences(model: &ModelUse) -> Vec<String> {
         })
         .collect();
     let mut sentences = vec![if names.is_empty() {
-        "Compensated: nothing of the model.".to_owned()
+        "Compensated: none of the model's effects.".to_owned()
     } else {
         format!("Compensated: {}.", names.join("; "))
     }];

@@ -11,7 +11,7 @@ pub const RIG: &[u8] = include_bytes!("../demo/rig.toml");
 /// The recording.
 pub const RECORDING: &[u8] = include_bytes!("../demo/run.csv");
 /// The tyre law that is true in the recording, in the words of `muslip simulate --law`.
-pub const LAW: &str = "magic-formula:8,1.95,0.92,0";
+pub const LAW: &str = "rudd:0.92,0.13";
 
 fn law() -> Option<RigLaw> {
     LAW.parse().ok()

@@ -175,7 +175,7 @@ pub struct ThermalFade<T> {
     pub reference_power_w: T,
 }
 
-/// A figure that is asked for: an error unless it holds.
+/// The check of one parameter; the error names the parameter that is out of range.
 type Checked = Result<(), Parameter>;
 
 fn demand(holds: bool, figure: Parameter) -> Checked {

@@ -75,7 +75,7 @@ pub fn run(path: &Path, required: Required) -> Result<campaign::Run, InputError>
     recording(path, required).map(|loaded| loaded.run)
 }
 
-/// As [`recording`]; `bytes_read` is told every now and then how many more bytes are done.
+/// As [`recording`]; `bytes_read` receives the number of bytes read since its last call.
 fn recording_reporting(
     path: &Path,
     required: Required,

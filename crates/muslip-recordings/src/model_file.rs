@@ -319,7 +319,7 @@ fn terms_complaint(table: &str, terms: &[RepairedTerm], context: &Context) -> Op
             return Some(if of_that_name {
                 Complaint {
                     key: way![table, index, "form"],
-                    what: format!("{} is no form of {}", quoted(&term.form), term.id),
+                    what: format!("{} is not a form of {}", quoted(&term.form), term.id),
                 }
             } else {
                 Complaint {
@@ -351,7 +351,7 @@ fn noise_complaint(noise: &NoiseModel) -> Option<Complaint> {
     let complain = |key: Vec<Step>, value: f64| {
         Some(Complaint {
             key,
-            what: format!("{value} is no standard deviation"),
+            what: format!("{value} is not a standard deviation"),
         })
     };
     for (key, value) in [
@@ -404,7 +404,7 @@ fn corrections_complaint(corrections: &[Correction]) -> Option<Complaint> {
         if Action::parse(&correction.acts_on).is_none() {
             return complain(
                 "acts_on",
-                format!("{} is nothing to act on", quoted(&correction.acts_on)),
+                format!("{} cannot be corrected", quoted(&correction.acts_on)),
             );
         }
         let (knots, values) = (&correction.knots, &correction.values);

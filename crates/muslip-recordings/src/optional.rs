@@ -40,7 +40,7 @@ const BRAKE: [(Channel, Slot); 2] = [
     (Channel::BrakePressure, |run| &mut run.brake_pressure_pa),
 ];
 
-/// Finds the optional columns that say nothing, leaves out those that would mislead, and tells of all.
+/// Finds optional columns without information, drops those that would mislead, and lists both.
 #[must_use]
 pub fn screen(runs: &mut [Run]) -> Vec<Fault> {
     let mut faults = Vec::new();

@@ -46,15 +46,15 @@ pub fn index(campaign: &Campaign, rig: &str, command: &str) -> Report {
         ],
         sections: vec![
             Section {
-                heading: "The runs beside each other".into(),
+                heading: "Comparison of the runs".into(),
                 blocks: figures(campaign).map(Block::Figure).into(),
             },
             Section {
-                heading: "Every run".into(),
+                heading: "All runs".into(),
                 blocks: vec![
                     Block::Paragraph(
-                        "A column's head sorts by it. Marked runs lie further from the median than 3.5 robust \
-                         standard deviations (their own uncertainty included), or do not bear out their own."
+                        "Click a column's head to sort. Marked runs lie more than 3.5 robust standard deviations \
+                         from the median (their own uncertainty included), or are overconfident."
                             .into(),
                     ),
                     Block::Table(table(campaign)),

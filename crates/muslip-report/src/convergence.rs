@@ -153,7 +153,7 @@ impl Convergence {
             .map(|frame| (frame.peak.critical_slip, frame.peak.peak_friction))
             .collect();
         let mut figure = Figure::new(
-            "The peak with its 1-sigma ellipse, close up, and the way the estimate took to it.",
+            "The peak with its 1-sigma ellipse, close up, and the path of the estimate.",
             Axis::new("critical slip").over(around(peak.critical_slip, peak.critical_slip_std)),
             Axis::new("peak friction").over(around(peak.peak_friction, peak.peak_friction_std)),
         )
@@ -161,7 +161,7 @@ impl Convergence {
         .with_live(
             Live::Way,
             Ink::Reference,
-            "way of the estimate",
+            "path of the estimate",
             Shape::Line(way),
         )
         .with_live(

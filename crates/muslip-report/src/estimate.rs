@@ -57,7 +57,7 @@ pub fn of_estimate(
             "{}, estimator {}, range {}",
             recording.display(),
             result.estimator.word(),
-            range_word(result.options.range)
+            range_word(result.range)
         ),
         verdict: estimate_sentence(result),
         tone,
@@ -84,7 +84,7 @@ pub fn of_estimate(
                 blocks: curve,
             },
             Section {
-                heading: "How the estimate settled".into(),
+                heading: "Convergence".into(),
                 blocks: settling_figures(result).map(Block::Figure).into(),
             },
             Section {
@@ -114,7 +114,7 @@ fn convergence(result: &EstimateResult, beside: Option<&CurveLabel>) -> Converge
     let record = &result.record;
     let thinned = if record.stride > 1 {
         format!(
-            " One in {} of {} measurements is in the page, so that its own run differs a little from the \
+            " The page contains one in {} of {} measurements, so that its results differ slightly from the \
              command's.",
             record.stride, result.used
         )
@@ -132,12 +132,12 @@ fn convergence(result: &EstimateResult, beside: Option<&CurveLabel>) -> Converge
         again: result.model.is_none().then_some(result.estimator),
         about_what_if: match result.model {
             None => format!(
-                "Change what the filter assumes and it runs again, here in the page: the same code that runs on \
-                 the rig.{thinned}"
+                "Change an assumption and the filter runs again in this page, with the code that runs on the \
+                 rig.{thinned}"
             ),
-            Some(_) => "There is no what-if on this page: a repaired model compensates every reading by the state \
-                        of the filter at that moment, so that other assumptions need the recording itself. Run \
-                        the command again with another --range or --estimator."
+            Some(_) => "No what-if on this page: with a repaired model each reading is compensated by the \
+                        filter's state at that sample, which needs the recording. Run the command again with \
+                        another --range or --estimator."
                 .to_owned(),
         },
     }
@@ -242,7 +242,7 @@ fn settling_figures(result: &EstimateResult) -> [Figure; 4] {
     );
     let line = |of: fn(&Update) -> f64| Shape::Line(along.of_update(of));
     let signal = Figure::new(
-        "What each measurement could tell, H P H' before and after it, and the variance of its noise (the \
+        "Signal of each measurement, H P H' before and after the update, and the variance of its noise (the \
          article's Figure 2).",
         measurements().logarithmic(),
         Axis::new("variance of friction").logarithmic(),

@@ -21,9 +21,9 @@ const FONT: &[u8] = include_bytes!("../vendor/dejavu/DejaVuSans.ttf");
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "clap", derive(clap::ValueEnum))]
 pub enum FigureFormat {
-    /// Vectors.
+    /// Vector graphics.
     Svg,
-    /// Pixels, 1520 wide.
+    /// Bitmap, 1520 pixels wide.
     Png,
 }
 

@@ -80,13 +80,13 @@ muslip.whatIf = (() => {
     const result = run(exports, assumed);
     const place = document.getElementById("what-if-result");
     if (result === null) {
-      place.textContent = "The filter does not take this start.";
+      place.textContent = "The filter refuses this start.";
       return;
     }
     const untouched = JSON.stringify(assumed) === JSON.stringify({ ...asItWas(), pseudonoise: assumed.pseudonoise })
       && (assumed.efficient || assumed.pseudonoise);
     const table = muslip.table(
-      untouched ? "As the command ran it" : "Under these assumptions",
+      untouched ? "As in the command's run" : "Under these assumptions",
       ["run by", "peak friction", "critical slip", "mean NIS", "verdict", "measurements used"],
       [describe("the command", host, data.used), describe("this page", result, result.used)],
     );

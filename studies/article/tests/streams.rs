@@ -10,7 +10,7 @@ use muslip::filter::mu_slip::Range;
 use nalgebra::{Matrix2, RowVector2, SVector, Vector2};
 use num_dual::{Dual2SVec64, DualNum, hessian};
 use study_article::{
-    ArticleStream, Band, Ours, PaperOptions, Statement, TRUTH, Verdict, article_streams,
+    ArticleStream, Band, Ours, PaperOptions, Reproduction, Statement, TRUTH, article_streams,
     first_start, frictions, slips, statements, traced,
 };
 use test_support::Tolerance;
@@ -51,7 +51,7 @@ fn share(about: &str) -> f64 {
 }
 
 #[track_caller]
-fn expect(about: &str, verdict: Verdict, median: std::ops::RangeInclusive<f64>) {
+fn expect(about: &str, verdict: Reproduction, median: std::ops::RangeInclusive<f64>) {
     let (band, _) = figure(about);
     assert_eq!(statement(about).verdict, Some(verdict), "{about}: {band:?}");
     assert!(median.contains(&band.median), "{about}: {band:?}");
@@ -60,8 +60,8 @@ fn expect(about: &str, verdict: Verdict, median: std::ops::RangeInclusive<f64>) 
 
 #[test]
 fn result_of_the_article_s_filter_is_one_of_ours() {
-    expect("filter's mup", Verdict::WithinTheBand, 0.339..=0.343);
-    expect("filter's sp", Verdict::WithinTheBand, 0.155..=0.158);
+    expect("filter's mup", Reproduction::WithinTheBand, 0.339..=0.343);
+    expect("filter's sp", Reproduction::WithinTheBand, 0.155..=0.158);
     let percentile = |about| figure(about).1.unwrap();
     assert!((0.37..0.47).contains(&percentile("filter's mup")));
     assert!((0.80..0.89).contains(&percentile("filter's sp")));
@@ -69,8 +69,16 @@ fn result_of_the_article_s_filter_is_one_of_ours() {
 
 #[test]
 fn result_of_the_article_s_regression_is_one_of_ours() {
-    expect("regression's mup", Verdict::WithinTheBand, 0.349..=0.351);
-    expect("regression's sp", Verdict::WithinTheBand, 0.149..=0.151);
+    expect(
+        "regression's mup",
+        Reproduction::WithinTheBand,
+        0.349..=0.351,
+    );
+    expect(
+        "regression's sp",
+        Reproduction::WithinTheBand,
+        0.149..=0.151,
+    );
     let percentile = |about| figure(about).1.unwrap();
     assert!((0.40..0.50).contains(&percentile("regression's mup")));
     assert!((0.76..0.85).contains(&percentile("regression's sp")));
@@ -78,7 +86,7 @@ fn result_of_the_article_s_regression_is_one_of_ours() {
 
 #[test]
 fn from_the_filter_s_start_a_regression_goes_another_way_than_the_article_s() {
-    let far = Verdict::NotReproduced;
+    let far = Reproduction::NotReproduced;
     expect("mup after 1 iteration", far, 0.33..=0.36);
     expect("sp after 1 iteration", far, 0.165..=0.177);
     expect("mup after 2 iterations", far, 0.34..=0.36);
@@ -94,12 +102,12 @@ fn pseudonoise_alone_stays_below_the_article_s_figure_and_with_measurement_noise
     // As measured beforehand by another program: 0.157 and 0.198 in the median.
     expect(
         "largest pseudonoise, std",
-        Verdict::NotReproduced,
+        Reproduction::NotReproduced,
         0.155..=0.160,
     );
     expect(
         "with the measurement's, std",
-        Verdict::WithinTheBand,
+        Reproduction::WithinTheBand,
         0.196..=0.200,
     );
 }
@@ -108,12 +116,12 @@ fn pseudonoise_alone_stays_below_the_article_s_figure_and_with_measurement_noise
 fn pseudonoise_begins_to_drop_where_the_article_says_and_takes_longer() {
     expect(
         "slip of the largest pseudonoise",
-        Verdict::WithinTheBand,
+        Reproduction::WithinTheBand,
         0.05..=0.07,
     );
     expect(
         "slip where that has halved",
-        Verdict::NotReproduced,
+        Reproduction::NotReproduced,
         0.10..=0.12,
     );
 }
@@ -124,7 +132,7 @@ fn correlation_is_positive_then_negative_and_turns_later_than_the_article_says()
     // As measured beforehand by another program: 0.30.
     expect(
         "slip where it changes sign",
-        Verdict::NotReproduced,
+        Reproduction::NotReproduced,
         0.29..=0.31,
     );
 }
@@ -133,7 +141,7 @@ fn correlation_is_positive_then_negative_and_turns_later_than_the_article_says()
 fn variance_of_critical_slip_halves_where_the_article_has_it_constant() {
     expect(
         "var sp at slip 0.15 over 0.05",
-        Verdict::NotReproduced,
+        Reproduction::NotReproduced,
         0.40..=0.50,
     );
 }
@@ -141,7 +149,7 @@ fn variance_of_critical_slip_halves_where_the_article_has_it_constant() {
 #[test]
 fn estimates_lie_within_one_sigma() {
     let about = "both estimates within one sigma";
-    assert_eq!(statement(about).verdict, Some(Verdict::Reproduced));
+    assert_eq!(statement(about).verdict, Some(Reproduction::Reproduced));
     assert!(share(about) > 0.98);
 }
 
@@ -151,7 +159,7 @@ fn a_second_pass_refines_most_streams_but_not_all() {
         "a second pass is nearer in mup",
         "a second pass is nearer in sp",
     ] {
-        assert_eq!(statement(about).verdict, Some(Verdict::WithinTheBand));
+        assert_eq!(statement(about).verdict, Some(Reproduction::WithinTheBand));
         assert!((0.6..0.75).contains(&share(about)), "{about}");
     }
 }

@@ -1,4 +1,4 @@
-//! Who drives the brake in the rows of the comparison, and what they share.
+//! The brake controllers that are compared, and the code that they share.
 
 use muslip_quarter_car::filter::{
     Channel, Filter as QuarterCarFilter, Measurement, StepError, Vehicle,

@@ -57,7 +57,7 @@ impl Ratios {
 /// A row of a table of ratios.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Row {
-    /// Who drives.
+    /// The brake controller.
     pub who: Who,
     /// On what.
     pub road: &'static str,

@@ -1,4 +1,4 @@
-//! Who drives, as the tables name it, and what is asked of it.
+//! The brake controllers by the names of the tables, and their settings.
 
 use super::banked::Banked;
 use super::drivers::{LockedWheel, PerfectState};
@@ -13,7 +13,7 @@ pub const BANK_MASS_STD_KG: f64 = 22.5;
 /// The same where the mass is uniform within 30 %, in kg.
 const WIDE_MASS_STD_KG: f64 = 78.0;
 
-/// Who drives.
+/// A brake controller of the comparison.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Who {
     /// (a)

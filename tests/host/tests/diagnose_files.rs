@@ -77,7 +77,7 @@ fn a_concealed_lag_is_found_and_the_repaired_model_predicts_a_run_that_it_never_
     let seen = names(4);
     let told = scratch.output(&arguments(&seen, &[]));
     assert!(
-        told.starts_with("Explained: the simulation leaves out force lag;"),
+        told.starts_with("Explained: the simulation lacks force lag;"),
         "{told}"
     );
     let value: Value = serde_json::from_str(&scratch.read("found/diagnosis.json")).unwrap();

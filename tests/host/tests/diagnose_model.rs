@@ -246,17 +246,17 @@ fn a_broken_model_is_named_with_its_place() {
         (
             "form = \"\"",
             "form = \"odd\"",
-            "tyre[0].form: \"odd\" is no form of force_lag",
+            "tyre[0].form: \"odd\" is not a form of force_lag",
         ),
         (
             "share_of_force = 0.004",
             "share_of_force = -1.0",
-            "noise.share_of_force: -1 is no standard",
+            "noise.share_of_force: -1 is not a standard",
         ),
         (
             "acts_on = \"friction\"",
             "acts_on = \"hope\"",
-            "corrections[0].acts_on: \"hope\" is nothing",
+            "corrections[0].acts_on: \"hope\" cannot be corrected",
         ),
         (
             "knots = [5.0, 15.0",

@@ -179,7 +179,7 @@ fn a_printed_trace_is_the_written_one_and_nothing_else() {
     let both = [
         "estimate", "--rig", "rig.toml", "--trace", "-", "--json", "run.csv",
     ];
-    assert!(scratch.complaint(&both).contains("both print"));
+    assert!(scratch.complaint(&both).contains("both write"));
     assert_eq!(scratch.files(), ["rig.toml", "run.csv", "t.csv"]);
 }
 
@@ -388,7 +388,7 @@ fn an_uncertainty_that_is_not_borne_out_is_told_with_the_answer() {
             .lines()
             .next()
             .unwrap()
-            .ends_with("do not bear this uncertainty out.")
+            .ends_with("scatter more than this uncertainty allows.")
     );
 }
 

@@ -308,7 +308,7 @@ fn other_assumptions_change_the_estimate_and_the_way_back_restores_it() {
         assert_eq!(browser.number(peak), usual, "{name}");
     }
     let told = browser.text("document.getElementById('what-if-result').textContent");
-    assert!(told.starts_with("As the command ran it"), "{told}");
+    assert!(told.starts_with("As in the command's run"), "{told}");
     assert_eq!(browser.problems(), [""; 0]);
 }
 

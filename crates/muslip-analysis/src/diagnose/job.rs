@@ -7,7 +7,7 @@ use muslip_recordings::load::Campaign;
 use super::json;
 
 /// Runs the engine on a campaign, which is given up to it. What had to be mended to read the recordings joins the
-/// faults of the data, and every number is finite. `progress` is told the share that is done, and of what.
+/// faults of the data, and every number is finite. `progress` receives the share done and the name of the step.
 #[must_use]
 pub fn run(campaign: Campaign, progress: &(dyn Fn(f64, &str) + Sync)) -> Diagnosis {
     let Campaign { rig, runs, faults } = campaign;

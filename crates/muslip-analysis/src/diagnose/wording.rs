@@ -1,4 +1,4 @@
-//! A diagnosis in an engineer's words: the sentences that the terminal and the report share.
+//! Sentences of a diagnosis, the same in the terminal and in the report.
 
 use muslip_diagnose::mechanism::Id;
 use muslip_diagnose::outcome::{
@@ -83,7 +83,7 @@ pub fn with_unit(number: String, unit: &str) -> String {
     }
 }
 
-/// A reported figure: name, value, 1-sigma, unit.
+/// A reported parameter: name, value, 1-sigma, unit.
 #[must_use]
 pub fn figure(figure: &ReportedParameter) -> String {
     format!(
@@ -213,22 +213,22 @@ pub fn verdict_sentence(diagnosis: &Diagnosis) -> String {
                 .to_owned()
         }
         Verdict::Explained => {
-            format!("Explained: the simulation leaves out {named}; with that, only noise remains.")
+            format!("Explained: the simulation lacks {named}; with it, only noise remains.")
         }
         Verdict::PartlyExplained => format!(
-            "Partly explained: the simulation leaves out {named}; what remains depends on {rest}."
+            "Partly explained: the simulation lacks {named}; the remaining error depends on {rest}."
         ),
         Verdict::Unexplained => format!(
-            "Unexplained: a real mismatch that no known mechanism accounts for; it depends on {rest}."
+            "Unexplained: a significant error that no known mechanism explains; it depends on {rest}."
         ),
         Verdict::Undecided => {
-            "Undecided: the recordings hold nothing that the simulation could be compared with."
+            "Undecided: the recordings contain no samples to compare with the simulation."
                 .to_owned()
         }
     }
 }
 
-/// A mechanism in a sentence, with its first figure.
+/// A mechanism in a sentence, with its first parameter.
 #[must_use]
 pub fn mechanism_sentence(mechanism: &NamedMechanism) -> String {
     let statement = capitalised(mechanism.statement.trim_end_matches('.'));
@@ -239,7 +239,7 @@ pub fn mechanism_sentence(mechanism: &NamedMechanism) -> String {
     )
 }
 
-/// What else a mechanism could be; empty where the evidence is clear.
+/// Alternatives to a mechanism; empty where the evidence is clear.
 #[must_use]
 pub fn confusable_sentence(mechanism: &NamedMechanism) -> String {
     if mechanism.confusable_with.is_empty() {
@@ -257,12 +257,12 @@ pub fn confusable_sentence(mechanism: &NamedMechanism) -> String {
 #[must_use]
 pub fn unexplained_sentence(rest: &Unexplained) -> String {
     let form = if rest.form.is_empty() {
-        "no short form holds, the model has a table".to_owned()
+        "no closed form fits, the model has a table".to_owned()
     } else {
         rest.form.clone()
     };
     format!(
-        "Unnamed, {} balance: depends on {} ({} of the mismatch, {} sigma): {form}.",
+        "Unnamed, {} balance: depends on {} ({} of the error, {} sigma): {form}.",
         rest.balance,
         variable(&rest.variable),
         percent(rest.share),
@@ -270,7 +270,7 @@ pub fn unexplained_sentence(rest: &Unexplained) -> String {
     )
 }
 
-/// A finding about the measuring chain, in a sentence with its figure.
+/// A finding about the measuring chain, in a sentence with its value.
 #[must_use]
 pub fn chain_sentence(finding: &ChainFinding) -> String {
     let statement = capitalised(finding.statement.trim_end_matches('.'));
@@ -300,15 +300,15 @@ pub fn gain(score: &BeforeAfter) -> String {
     format!("{} -> {} ({change})", newtons(before), newtons(after))
 }
 
-/// The smallest effect that could have been seen.
+/// The smallest detectable effect.
 #[must_use]
 pub fn least(least: &MinimumDetectable) -> String {
     let (value, _, unit) = handy(least.value, 0.0, &least.unit);
     with_unit(significant(value, 2), unit)
 }
 
-/// What was looked for and not named: first what could not have been seen, then what could, with the
-/// effect that would have gone unnoticed, the most worrying first.
+/// Mechanisms that were looked for and not named: first those that cannot be identified, then those that can,
+/// with their smallest detectable effect, the largest against its practical importance first.
 #[must_use]
 pub fn unseen(diagnosis: &Diagnosis) -> (Vec<&LookedFor>, Vec<(&LookedFor, &MinimumDetectable)>) {
     let not_named = |looked_for: &&LookedFor| {
@@ -330,7 +330,7 @@ pub fn unseen(diagnosis: &Diagnosis) -> (Vec<&LookedFor>, Vec<(&LookedFor, &Mini
     (hidden, visible)
 }
 
-/// Size of a mechanism's first figure from which an engineer cares. Only the order of a list hangs on it.
+/// Size of a mechanism's first parameter from which it matters in practice; only sorts a list.
 fn matters_from(diagnosis: &Diagnosis, id: &str) -> f64 {
     let guide = Id::parse(id).and_then(Id::guide);
     let size = guide.map_or(0.0, |guide| {

@@ -55,8 +55,9 @@ pub struct EstimateOptions {
     /// Which filter; `None`: the efficient one, or the article's where a model is compensated that the
     /// efficient one cannot stand behind (a low-pass filter on the force).
     pub estimator: Option<EstimatorKind>,
-    /// Where it starts.
-    pub range: Range,
+    /// Range of tyres that it starts from; `None`: for the efficient estimator that of the recording
+    /// ([`Survey::range`]), for the article's filter the article's.
+    pub range: Option<Range>,
 }
 
 /// What came out.
@@ -66,6 +67,8 @@ pub struct EstimateResult {
     pub options: EstimateOptions,
     /// Which filter estimated.
     pub estimator: EstimatorKind,
+    /// Range of tyres that it started from.
+    pub range: Range,
     /// The final estimate.
     pub peak: PeakEstimate<f64>,
     /// Samples that were used.
@@ -94,7 +97,7 @@ pub enum EstimateError {
     /// The same of the efficient estimator.
     #[error(transparent)]
     EfficientConfig(#[from] efficient::ConfigError),
-    /// The model's figures are none that can be compensated.
+    /// The model's parameters cannot be compensated.
     #[error("the model cannot be compensated: {0}")]
     Model(String),
     /// The trace could not be written.
@@ -106,7 +109,7 @@ pub enum EstimateError {
 ///
 /// `model` is what a diagnosis found: of its mechanisms those are compensated that can be, sample by
 /// sample, and where the rig file declares no drag noise the model's counts. `trace` takes the estimate
-/// after every used sample. `progress` is told the bytes gone through, of twice the recording's length.
+/// after every used sample. `progress` receives the bytes read so far, of twice the recording's length.
 ///
 /// # Errors
 /// [`EstimateError::Input`] for a malformed recording or one without a usable sample,
@@ -154,11 +157,15 @@ pub fn estimate<W: Write>(
         None if filtered => EstimatorKind::Article,
         None => EstimatorKind::Efficient,
     };
+    // The article's filter starts where the article does unless it is told otherwise.
+    let found = match kind {
+        EstimatorKind::Article => Range::default(),
+        EstimatorKind::Efficient => survey.range,
+    };
+    let range = options.range.unwrap_or(found);
     let filter = match kind {
-        EstimatorKind::Article => Filter::Article(Config::for_range(options.range).build()?),
-        EstimatorKind::Efficient => {
-            Filter::Efficient(efficient::Config::for_range(options.range).build()?)
-        }
+        EstimatorKind::Article => Filter::Article(Config::for_range(range).build()?),
+        EstimatorKind::Efficient => Filter::Efficient(efficient::Config::for_range(range).build()?),
     };
     let mut result = run(
         filter,
@@ -171,6 +178,7 @@ pub fn estimate<W: Write>(
     )?;
     result.model = model;
     result.estimator = kind;
+    result.range = range;
     Ok(result)
 }
 
@@ -345,6 +353,7 @@ fn run<W: Write>(
     Ok(EstimateResult {
         options,
         estimator: EstimatorKind::Article,
+        range: Range::default(),
         peak: filter.peak(),
         used,
         skipped,
@@ -373,7 +382,40 @@ fn trace_row(time_s: f64, fusion: &Fusion<f64>, estimate: &Estimate<f64>) -> Tra
     }
 }
 
+/// Where the range of tyres came from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum RangeSource {
+    /// It was given.
+    Option,
+    /// Friction and slip of the recording, beside the rig file's tyre.
+    Recording,
+    /// The article's filter starts where the article does.
+    Default,
+}
+
+impl RangeSource {
+    /// As in JSON.
+    #[must_use]
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Option => "option",
+            Self::Recording => "recording",
+            Self::Default => "default",
+        }
+    }
+}
+
 impl EstimateResult {
+    /// Where its range came from.
+    #[must_use]
+    pub fn range_source(&self) -> RangeSource {
+        match (self.options.range, self.estimator) {
+            (Some(_), _) => RangeSource::Option,
+            (None, EstimatorKind::Efficient) => RangeSource::Recording,
+            (None, EstimatorKind::Article) => RangeSource::Default,
+        }
+    }
+
     /// The result as the contract's JSON object, `muslip.estimate/1`, with a few fields more.
     pub fn to_json(&self) -> serde_json::Value {
         #[derive(Serialize)]
@@ -400,7 +442,8 @@ impl EstimateResult {
         let mut object = json!({
             "schema": "muslip.estimate/1",
             "estimator": self.estimator.word(),
-            "range": range_word(self.options.range),
+            "range": range_word(self.range),
+            "range_source": self.range_source().word(),
             "peak_friction": Quantity { value: peak.peak_friction, std: peak.peak_friction_std },
             "critical_slip": Quantity { value: peak.critical_slip, std: peak.critical_slip_std },
             "correlation": peak.correlation,

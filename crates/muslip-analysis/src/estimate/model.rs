@@ -445,7 +445,7 @@ impl<const N: usize> Compensating for Compensator<f64, N> {
 /// Builds the compensator of a model.
 ///
 /// # Errors
-/// One sentence: figures that no compensation takes, a delay of too many samples.
+/// One sentence: parameters that cannot be compensated, or a delay of too many samples.
 pub(super) fn compensator(
     used: &ModelUse,
     radius_m: f64,

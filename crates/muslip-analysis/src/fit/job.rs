@@ -55,7 +55,7 @@ pub enum FitJobError {
     Input(#[from] InputError),
 }
 
-/// Fits one curve to several recordings together. `progress` is told the bytes gone through, of twice
+/// Fits one curve to several recordings together. `progress` receives the bytes read so far, of twice
 /// the recordings' length.
 ///
 /// # Errors
@@ -164,7 +164,7 @@ impl FitResult {
         skipped
     }
 
-    /// By what factor the 1-sigma figures are too small because neighbouring residuals agree, if that is
+    /// Factor by which the 1-sigma values are too small because neighbouring residuals are correlated, if that is
     /// worth a word: sqrt((1 + r)/(1 - r)), the effective number of samples of a first-order
     /// autoregression.
     pub fn understatement(&self) -> Option<f64> {

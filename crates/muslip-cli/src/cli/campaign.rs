@@ -18,30 +18,30 @@ use super::failure::Failure;
 use super::progress::Progress;
 use super::terminal::Terminal;
 
-/// Estimate many recordings of one rig and compare them: a page side by side, a page each.
+/// Estimate many recordings of one rig and compare them: one overview page, one report per run.
 ///
-/// Writes index.html, sortable, with the runs that stand out marked, and the report of every run beside
-/// it.
+/// Writes index.html, a sortable table in which the runs that stand out are marked, and the report of every
+/// run.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  \
 muslip campaign --rig rig.toml --out campaign runs/*.csv\n  \
-muslip campaign --rig rig.toml --range automotive --out campaign --json runs/*.csv")]
+muslip campaign --rig rig.toml --out campaign --json runs/*.csv")]
 pub(super) struct Arguments {
     /// Rig file (TOML).
     #[arg(long, value_name = "RIG.toml")]
     rig: PathBuf,
     #[command(flatten)]
     choices: Choices,
-    /// Folder for the pages; made if it is not there.
+    /// Folder for the pages; created if missing.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
-    /// Also write the figures of index.html for a document, into DIR/figures.
+    /// Also write the plots of index.html as image files, into DIR/figures.
     #[arg(long, value_enum)]
     format: Option<FigureFormat>,
-    /// Print one JSON object and nothing else; files are written all the same.
+    /// Print one JSON object and nothing else; the files are written as well.
     #[arg(long)]
     json: bool,
-    /// The recordings (CSV), one file a run.
+    /// The recordings (CSV), one file per run.
     #[arg(value_name = "RUN.csv", required = true)]
     recordings: Vec<PathBuf>,
 }
@@ -156,7 +156,7 @@ fn command(arguments: &Arguments) -> String {
         .map(|path| path.display().to_string())
         .collect();
     format!(
-        "muslip campaign --rig {} {} {}",
+        "muslip campaign --rig {} {}{}",
         arguments.rig.display(),
         arguments.choices.words(),
         recordings.join(" ")

@@ -3,8 +3,8 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use muslip::filter::mu_slip::Range;
-use muslip_analysis::estimate::{EstimateOptions, EstimatorKind};
+use muslip_analysis::diagnose::wording::spoken;
+use muslip_analysis::estimate::EstimateOptions;
 use muslip_analysis::wording::estimate_sentence;
 use muslip_diagnose::outcome::Diagnosis;
 use muslip_recordings::output::{create_folder, write_file};
@@ -17,7 +17,7 @@ use super::failure::Failure;
 use super::terminal::Terminal;
 use crate::demo;
 
-/// Show both main jobs on bundled recordings: estimate a curve, find a concealed effect; write reports with plots.
+/// Estimate a mu-slip curve and find a concealed effect, on bundled recordings; write reports with plots.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  muslip demo\n  muslip demo --out somewhere")]
 pub(super) struct Arguments {
@@ -38,8 +38,8 @@ pub(super) fn run(arguments: &Arguments, terminal: &mut Terminal) -> Result<(), 
         recording_path: &recording,
         model_path: None,
         options: EstimateOptions {
-            estimator: Some(EstimatorKind::Article),
-            range: Range::Automotive,
+            estimator: None,
+            range: None,
         },
         trace: Some(&trace),
         report: Some(&report),
@@ -48,16 +48,14 @@ pub(super) fn run(arguments: &Arguments, terminal: &mut Terminal) -> Result<(), 
     };
     let result = job.run()?;
     let truth = demo::true_peak();
-    terminal.line(
-        "A braked wheel, recorded on the simulated rig: three applications of the brake, each",
+    terminal.paragraph(
+        "1. Estimate. One recording of a simulated rig: a car tyre at 45 m/s, braked three times through the peak \
+         to a locked wheel.",
     )?;
-    terminal.line("through the peak to a locked wheel. Its tyre follows a curve that the filter does not know.")?;
     terminal.line("")?;
     terminal.headline(&estimate_sentence(&result))?;
-    let away = (result.peak.peak_friction - truth.friction).abs() / result.peak.peak_friction_std;
     terminal.paragraph(&format!(
-        "True: {:.3}, at a slip of {:.3}. That is {away:.0} sigma away, which is what a curve of another shape \
-         costs; the correlated innovations below give it away.",
+        "The tyre that was simulated: {:.3}, at a slip of {:.3}.",
         truth.friction, truth.slip_ratio
     ))?;
     terminal.line("")?;
@@ -66,9 +64,10 @@ pub(super) fn run(arguments: &Arguments, terminal: &mut Terminal) -> Result<(), 
     terminal.line(&format!("Report with plots: {}", report.display()))?;
     terminal.line(&format!("Estimate after every sample: {}", trace.display()))?;
     terminal.line("")?;
-    terminal.line("The same by hand:")?;
+    terminal
+        .line("The same by hand (--estimator article: the filter of Rudd's article instead):")?;
     terminal.line(&format!(
-        "  muslip estimate --rig {} --range automotive --report report.html {}",
+        "  muslip estimate --rig {} --report report.html {}",
         rig.display(),
         recording.display()
     ))?;
@@ -101,8 +100,8 @@ fn find_concealed(folder: &Path, terminal: &mut Terminal) -> Result<(), Failure>
     files::write(&found, &diagnosis, &views, &command)?;
     terminal.line("")?;
     terminal.paragraph(
-        "Four recordings of another rig, of other physics than the simulation: one effect was concealed in them. \
-         What the simulation leaves out of them:",
+        "2. Diagnose. Four recordings of another rig, in which one fault of the measuring chain is concealed. Nothing \
+         in the files mentions it.",
     )?;
     terminal.line("")?;
     let summary = summary(&diagnosis, &found, terminal.width(WIDEST_LINE));
@@ -116,7 +115,7 @@ fn find_concealed(folder: &Path, terminal: &mut Terminal) -> Result<(), Failure>
     terminal.paragraph(&opened(&diagnosis))?;
     terminal.line("")?;
     terminal.line(&format!(
-        "Before and after: {}",
+        "Report with plots, before and after the repair: {}",
         found.join("report.html").display()
     ))?;
     terminal.line("The same by hand:")?;
@@ -144,7 +143,7 @@ fn opened(diagnosis: &Diagnosis) -> String {
                     }
                 })
                 .collect();
-            format!("{}{}", named.id, figures.join(","))
+            format!("{}{}", spoken(named.id), figures.join(","))
         })
         .collect();
     let found = if found.is_empty() {
@@ -153,8 +152,8 @@ fn opened(diagnosis: &Diagnosis) -> String {
         found.join("; ")
     };
     format!(
-        "The truth, opened now: concealed: {} {:.1} ms; found: {found}.",
-        demo::CONCEALED,
+        "Concealed: {} {:.1} ms. Found: {found}.",
+        spoken(demo::CONCEALED),
         1e3 * demo::CONCEALED_DELAY_S
     )
 }

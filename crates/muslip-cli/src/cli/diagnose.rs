@@ -16,12 +16,11 @@ use super::failure::Failure;
 use super::progress::Progress;
 use super::terminal::Terminal;
 
-/// Find what the simulation leaves out of recordings: where, which mechanism, how large, how sure.
+/// Find the effects in recordings that the simulation lacks: where, which mechanism, size, confidence.
 ///
-/// Writes diagnosis.json, model.toml (the repaired model: see `predict` and `estimate --model`) and
-/// report.html into a folder, all together at the end. Give several recordings of one rig: some are kept
-/// back to prove the repair on. Faults of the data are no reason to stop: they are listed, and the rest
-/// is used.
+/// Writes diagnosis.json, model.toml (the repaired model, for `predict` and `estimate --model`) and
+/// report.html into a folder when the diagnosis is complete. Give several recordings of one rig: some are
+/// held out to test the repaired model. Faults in the data are listed, and the other samples are used.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  \
 muslip diagnose --rig rig.toml --out found run1.csv run2.csv run3.csv\n  \
@@ -30,16 +29,16 @@ pub(super) struct Arguments {
     /// Rig file (TOML).
     #[arg(long, value_name = "RIG.toml")]
     rig: PathBuf,
-    /// Folder for the three files; made if it is not there.
+    /// Folder for the three files; created if missing.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
-    /// Also write the report's figures for a document, into DIR/figures.
+    /// Also write the report's plots as image files, into DIR/figures.
     #[arg(long, value_enum)]
     format: Option<FigureFormat>,
     /// Print diagnosis.json and nothing else.
     #[arg(long)]
     json: bool,
-    /// The recordings (CSV), one file a run.
+    /// The recordings (CSV), one file per run.
     #[arg(value_name = "RUN.csv", required = true)]
     recordings: Vec<PathBuf>,
 }

@@ -6,8 +6,8 @@ use std::path::{Path, PathBuf};
 use clap::{Args, ValueEnum};
 use muslip::filter::mu_slip::Range;
 use muslip_analysis::estimate::{
-    EstimateError, EstimateOptions, EstimateResult, EstimatorKind, TraceFormat, TraceWriter,
-    estimate,
+    EstimateError, EstimateOptions, EstimateResult, EstimatorKind, RangeSource, TraceFormat,
+    TraceWriter, estimate, range_word,
 };
 use muslip_analysis::wording::{
     consistency_sentence, estimate_sentence, model_sentences, noise_sentence,
@@ -27,13 +27,13 @@ const PRINTED: &str = "-";
 
 /// Estimate peak friction and the slip of the peak from one recording, sample by sample.
 ///
-/// Every row with finite values, a vehicle speed of at least 0.5 m/s, a normal force of at least 2 % of
-/// the recording's median and a slip between 0 and 1 (with a margin of 0.05 for noise) is a measurement;
-/// others are skipped and counted.
+/// A row is used where its values are finite, the vehicle speed is at least 0.5 m/s, the normal force is at
+/// least 2 % of the recording's median and the slip is between 0 and 1 (with a margin of 0.05 for noise).
+/// Other rows are skipped and counted.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  \
 muslip estimate --rig rig.toml run.csv\n  \
-muslip estimate --rig rig.toml --range automotive --report run.html run.csv\n  \
+muslip estimate --rig rig.toml --report run.html run.csv\n  \
 muslip estimate --rig rig.toml --trace trace.csv --json run.csv\n  \
 muslip estimate --rig rig.toml --model found/model.toml run.csv")]
 pub(super) struct Arguments {
@@ -42,19 +42,19 @@ pub(super) struct Arguments {
     rig: PathBuf,
     #[command(flatten)]
     choices: Choices,
-    /// Compensate what a diagnosis found, sample by sample: `model.toml` as `diagnose` writes it. Effects
-    /// that can be compensated are radius, delay, lag, zero drift, crosstalk, load and speed
-    /// sensitivity, relaxation and tread temperature; others are named and left.
+    /// Compensate the effects that a diagnosis found, sample by sample: the `model.toml` that `diagnose`
+    /// wrote. Compensated are radius, delay, lag, zero drift, crosstalk, load and speed sensitivity,
+    /// relaxation and tread temperature; other effects are listed and not compensated.
     #[arg(long, value_name = "MODEL.toml")]
     model: Option<PathBuf>,
     /// Write the estimate after every sample: CSV, or JSON where the name ends in .json or .jsonl; `-`
-    /// prints it as CSV in place of the words.
+    /// prints CSV on standard output instead of the summary.
     #[arg(long, value_name = "TRACE.csv")]
     trace: Option<PathBuf>,
     /// Write a report with plots.
     #[arg(long, value_name = "OUT.html")]
     report: Option<PathBuf>,
-    /// Also write the report's figures for a document, into the folder OUT-figures beside it.
+    /// Also write the report's plots as image files, into the folder OUT-figures beside it.
     #[arg(long, value_enum, requires = "report")]
     format: Option<FigureFormat>,
     /// Print one JSON object and nothing else.
@@ -68,12 +68,12 @@ pub(super) struct Arguments {
 /// How to estimate; the campaign has the same.
 #[derive(Debug, Args)]
 pub(super) struct Choices {
-    /// Where the filter starts: peak friction 0.6 (aircraft) or 1.0 (automotive), each give or take
-    /// itself.
-    #[arg(long, value_enum, default_value_t = RangeChoice::Aircraft)]
-    range: RangeChoice,
-    /// Which filter estimates; efficient unless a model with a low-pass filter on the force is
-    /// compensated.
+    /// Tyres to start from: peak friction 0.6 ± 0.6 (aircraft) or 1.0 ± 1.0 (automotive). Where it is not
+    /// given it is found from the recording, and `article` starts as aircraft.
+    #[arg(long, value_enum)]
+    range: Option<RangeChoice>,
+    /// The estimator; `efficient` where it is not given, `article` where `--model` has a low-pass filter on
+    /// the force.
     #[arg(long, value_enum)]
     estimator: Option<EstimatorChoice>,
 }
@@ -85,18 +85,20 @@ impl Choices {
                 EstimatorChoice::Article => EstimatorKind::Article,
                 EstimatorChoice::Efficient => EstimatorKind::Efficient,
             }),
-            range: self.range.into(),
+            range: self.range.map(Range::from),
         }
     }
 
-    /// The choices as arguments.
+    /// The choices as arguments, each with a space after it.
     pub(super) fn words(&self) -> String {
         let options = self.options();
-        let range = muslip_analysis::estimate::range_word(options.range);
-        match options.estimator {
-            Some(estimator) => format!("--range {range} --estimator {}", estimator.word()),
-            None => format!("--range {range}"),
-        }
+        let range = options
+            .range
+            .map(|range| format!("--range {} ", range_word(range)));
+        let estimator = options
+            .estimator
+            .map(|estimator| format!("--estimator {} ", estimator.word()));
+        range.unwrap_or_default() + &estimator.unwrap_or_default()
     }
 }
 
@@ -119,9 +121,9 @@ impl From<RangeChoice> for Range {
 /// `--estimator`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum EstimatorChoice {
-    /// The article's extended Kalman filter: three times the noise, pseudonoise.
+    /// Extended Kalman filter of Rudd's article: noise inflated three times, pseudonoise.
     Article,
-    /// As accurate as a batch fit by maximum likelihood; learns the noise, rejects outliers.
+    /// Recursive maximum likelihood, as accurate as a batch fit; learns the noise, rejects outliers.
     Efficient,
 }
 
@@ -129,7 +131,7 @@ pub(super) fn run(arguments: &Arguments, terminal: &mut Terminal) -> Result<(), 
     let trace_is_printed = arguments.trace.as_deref() == Some(Path::new(PRINTED));
     if trace_is_printed && arguments.json {
         return Err(Failure::Usage(
-            "--trace - and --json would both print: give one of them a file".into(),
+            "--trace - and --json both write to standard output: give --trace a file name".into(),
         ));
     }
     let job = Job {
@@ -181,7 +183,7 @@ impl Job<'_> {
         self.run_reporting(&mut |bytes| progress.done(bytes))
     }
 
-    /// As [`Job::run`]; `progress` is told the bytes gone through, of twice the recording's length.
+    /// As [`Job::run`]; `progress` receives the bytes read so far, of twice the recording's length.
     pub(super) fn run_reporting(
         &self,
         progress: &mut dyn FnMut(u64),
@@ -255,7 +257,7 @@ impl Job<'_> {
         format!(
             "muslip estimate --rig {} --range {} --estimator {} {model}{}",
             self.rig_path.display(),
-            muslip_analysis::estimate::range_word(self.options.range),
+            range_word(result.range),
             result.estimator.word(),
             self.recording_path.display()
         )
@@ -315,6 +317,20 @@ fn trace_failure(path: &Path, error: io::Error) -> Failure {
     }
 }
 
+/// Which estimator ran and which range it started from.
+fn estimator_words(result: &EstimateResult) -> String {
+    let from = match result.range_source() {
+        RangeSource::Option => "given",
+        RangeSource::Recording => "found from the recording",
+        RangeSource::Default => "default",
+    };
+    format!(
+        "{}; range {} ({from})",
+        result.estimator.word(),
+        range_word(result.range)
+    )
+}
+
 /// The result below its headline.
 pub(super) fn tell(result: &EstimateResult, terminal: &mut Terminal) -> Result<(), Failure> {
     let peak = &result.peak;
@@ -339,6 +355,7 @@ pub(super) fn tell(result: &EstimateResult, terminal: &mut Terminal) -> Result<(
         ),
         ("correlation", format!("{:.3}", peak.correlation)),
         ("samples", format!("{} used, {skipped}", result.used)),
+        ("estimator", estimator_words(result)),
     ])?;
     terminal.line("")?;
     for sentence in result.model.iter().flat_map(model_sentences) {

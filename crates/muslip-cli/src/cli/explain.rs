@@ -11,9 +11,9 @@ use muslip_report::{FigureFormat, write_figures};
 use super::failure::Failure;
 use super::terminal::Terminal;
 
-/// Explain a mechanism that a diagnosis may name: physics, equation, look-alikes and the run that tells them apart.
+/// Explain a mechanism that a diagnosis may name: physics, equation, alternatives and the test that separates them.
 ///
-/// Without a name: all of them, one a line. docs/mechanisms.md has them with pictures.
+/// Without a name: list all mechanisms, one per line. With pictures: docs/mechanisms.md.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  \
 muslip explain\n  \

@@ -15,7 +15,7 @@ use super::terminal::Terminal;
 
 /// Fit the two-parameter law to one or several recordings at once (Levenberg-Marquardt).
 ///
-/// The same rows count as for `estimate`, all with one weight. The covariance is s^2 (J'J)^-1.
+/// Rows are selected as in `estimate` and have equal weight. The covariance is s^2 (J'J)^-1.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  \
 muslip fit --rig rig.toml run.csv\n  \
@@ -24,7 +24,7 @@ pub(super) struct Arguments {
     /// Rig file (TOML).
     #[arg(long, value_name = "RIG.toml")]
     rig: PathBuf,
-    /// Most iterations (accepted steps).
+    /// Maximum number of iterations (accepted steps).
     #[arg(long, value_name = "N", default_value_t = DEFAULT_MAXIMUM_ITERATIONS)]
     max_iterations: usize,
     /// Print one JSON object and nothing else.
@@ -70,7 +70,7 @@ fn tell(result: &FitResult, terminal: &mut Terminal) -> Result<(), Failure> {
     let ended = if fit.converged {
         "converged"
     } else {
-        "not converged: the limit of iterations ended it"
+        "not converged: iteration limit reached"
     };
     let mut rows = vec![
         (
@@ -110,8 +110,8 @@ fn tell(result: &FitResult, terminal: &mut Terminal) -> Result<(), Failure> {
     if let Some(factor) = result.understatement() {
         terminal.line("")?;
         terminal.paragraph(&format!(
-            "Neighbouring residuals agree (correlation {:.2}): filtered noise, or a curve of another shape. \
-             The 1-sigma figures take samples as independent and are too small by about {factor:.0} times.",
+            "Neighbouring residuals are correlated ({:.2}): filtered noise, or a tyre curve of another shape. \
+             The 1-sigma values assume independent samples and are too small by a factor of about {factor:.0}.",
             result.residual_correlation
         ))?;
     }

@@ -16,36 +16,36 @@ use serde::Serialize;
 use super::failure::Failure;
 use super::terminal::Terminal;
 
-/// Predict the drag reading of a recording from its other columns, by a repaired model.
+/// Predict the drag reading of a recording from its other columns with a repaired model.
 ///
-/// Writes time_s,drag_force_n,drag_force_sigma_n,contact_force_n, one row a row of the recording:
-/// what the load cell is expected to read (the measuring chain's effects included), its 1-sigma noise,
-/// and the force in the contact. The recording's own drag_force_n is never used and may be absent.
+/// Writes time_s,drag_force_n,drag_force_sigma_n,contact_force_n, one row per row of the
+/// recording: the expected reading of the load cell (with the effects of the measuring chain), its 1-sigma
+/// noise, and the force in the contact. The recording's own drag_force_n is not used and may be absent.
 ///
-/// With --score it compares instead: how well base law and repaired model predict the drag that was
-/// recorded. Given all recordings that the model was made from, these are the figures of `fit` in
-/// diagnosis.json, to the last digit but one or two.
+/// With --score the drag predicted by the base law and by the repaired model is compared with the recorded
+/// one. For all recordings that the model was fitted to, the scores equal `fit` in diagnosis.json to within
+/// rounding.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  \
 muslip predict --rig rig.toml --model found/model.toml --out pred.csv run7.csv\n  \
 muslip predict --rig rig.toml --model found/model.toml --base --out base.csv run7.csv\n  \
 muslip predict --rig rig.toml --model found/model.toml --score run1.csv run2.csv run3.csv")]
 pub(super) struct Arguments {
-    /// Rig file (TOML): that of the model; radius, inertia, mass and brake must be equal.
+    /// Rig file (TOML); radius, inertia, mass and brake must equal the model's.
     #[arg(long, value_name = "RIG.toml")]
     rig: PathBuf,
     /// Repaired model, as `diagnose` writes it.
     #[arg(long, value_name = "MODEL.toml")]
     model: PathBuf,
-    /// Where the prediction goes.
+    /// File for the prediction.
     #[arg(long, value_name = "PRED.csv", required_unless_present = "score")]
     out: Option<PathBuf>,
-    /// Predict by the unrepaired base law, refitted.
+    /// Predict with the refitted base law instead of the repaired model.
     #[arg(long)]
     base: bool,
-    /// Print how well both models predict these recordings, as one JSON object and nothing else:
-    /// root mean square error, negative log likelihood a sample and whiteness, for recordings that the
-    /// model was fitted to, that were held out, and that it has never seen.
+    /// Print how well both models predict these recordings, as one JSON object and nothing else: root mean
+    /// square error, negative log likelihood per sample and whiteness, for fitted, held-out and new
+    /// recordings.
     #[arg(long, conflicts_with_all = ["out", "base"])]
     score: bool,
     /// The recording (CSV); several with --score.
@@ -87,7 +87,7 @@ pub(super) fn run(arguments: &Arguments, terminal: &mut Terminal) -> Result<(), 
     }
     let [recording] = arguments.recordings.as_slice() else {
         return Err(Failure::Usage(
-            "a prediction is of one recording: give one, or --score".into(),
+            "give one recording, or --score for several".into(),
         ));
     };
     let out: &Path = arguments.out.as_deref().unwrap_or(Path::new(""));

@@ -14,10 +14,10 @@ use super::rig_view::{LiveView, Seen};
 use super::terminal::Terminal;
 use crate::rig_link::{Port, Recorder, RigError, Session, parse_parameters, write_parameters};
 
-/// Work a rig: arm it, run a brake profile, record while it runs.
+/// Operate a rig: arm it, run a brake profile and record it.
 ///
-/// The controller dumps the brake when this program falls silent for a quarter of a second, so that ending it
-/// by force is a stop. docs/rig.md has the wiring and the way from the box to the first ramp.
+/// The controller releases the brake when it has heard nothing from this program for 0.25 s: killing the program
+/// stops the run. Wiring and commissioning: docs/rig.md.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  \
 muslip rig --port /dev/ttyUSB0 status\n  \
@@ -36,11 +36,11 @@ pub(super) struct Arguments {
 
 #[derive(Debug, Subcommand)]
 enum Action {
-    /// Where the controller is, what stands against arming, what the link has seen.
+    /// Print the controller's state, the interlocks that prevent arming and the link's counters.
     Status,
-    /// Take the present bridge readings as no force; the rig must stand and the tyre be lifted.
+    /// Zero the load cells, with the rig at rest and the tyre lifted.
     Tare,
-    /// Unlatch a fault whose cause is gone.
+    /// Reset a latched fault whose cause has been removed.
     Clear,
     /// Print the parameters, or set all of them from a file.
     Parameters {
@@ -48,31 +48,31 @@ enum Action {
         #[arg(long, value_name = "PARAMETERS.toml")]
         set: Option<PathBuf>,
     },
-    /// Arm, run a profile, record until it is done.
+    /// Arm, run a brake profile and record it.
     Run(Run),
 }
 
 #[derive(Debug, Args)]
 struct Run {
-    /// Pressure rises by this share of the full pressure a second until the wheel skids.
+    /// Pressure ramp, as a share of full pressure per second, until the wheel skids.
     #[arg(long, value_name = "SHARE/S", group = "program")]
     ramp: Option<f32>,
-    /// Pressure is held at these shares of the full pressure, one after the other; up to eight.
+    /// Pressure steps, as shares of full pressure, one after the other; at most eight.
     #[arg(long, value_name = "SHARES", value_delimiter = ',', group = "program", num_args = 1..)]
     steps: Option<Vec<f32>>,
-    /// Slip is held at this value.
+    /// Hold this slip.
     #[arg(long, value_name = "SLIP", group = "program")]
     slip: Option<f32>,
-    /// How long each step, or the slip, is held in s.
+    /// Hold time of each step, or of the slip, in s.
     #[arg(long, value_name = "S", default_value_t = 1.0)]
     hold: f32,
-    /// Vehicle speed in m/s from which the brake is applied.
+    /// Vehicle speed at which the brake is applied, in m/s.
     #[arg(long, value_name = "M/S", default_value_t = 15.0)]
     start_speed: f32,
-    /// Slip from which the wheel skids.
+    /// Slip from which the wheel counts as skidding.
     #[arg(long, value_name = "SLIP", default_value_t = 0.5)]
     skid_slip: f32,
-    /// How long a skid is held in s, at most 0.15.
+    /// Hold time of a skid in s, at most 0.15.
     #[arg(long, value_name = "S", default_value_t = 0.05)]
     skid_hold: f32,
     /// Brake applications.
@@ -81,7 +81,7 @@ struct Run {
     /// Pause after each application in s.
     #[arg(long, value_name = "S", default_value_t = 5.0)]
     cool: f32,
-    /// Where the recording goes, line by line as it happens.
+    /// File for the recording, written row by row during the run.
     #[arg(long, value_name = "RUN.csv")]
     out: PathBuf,
 }
@@ -144,8 +144,8 @@ pub(super) fn run(arguments: &Arguments, terminal: &mut Terminal) -> Result<(), 
         Action::Parameters { .. } => {
             if let Some(parameters) = parameters {
                 let command = Command::SetParameters { parameters };
-                session.ask("take the parameters", command, |_| {})?;
-                return terminal.line("parameters taken and stored");
+                session.ask("accept the parameters", command, |_| {})?;
+                return terminal.line("parameters accepted and stored");
             }
             let text = write_parameters(&read_parameters(&mut session)?)
                 .map_err(|error| Failure::Internal(error.to_string()))?;
@@ -197,7 +197,7 @@ fn profile(run: &Run) -> Result<Profile, Failure> {
 
 fn status(session: &mut Session) -> Result<Status, RigError> {
     let mut found = None;
-    session.ask("tell its status", Command::ReadStatus, |message| {
+    session.ask("report its status", Command::ReadStatus, |message| {
         if let Telemetry::Status(status) = message {
             found = Some(*status);
         }
@@ -207,11 +207,15 @@ fn status(session: &mut Session) -> Result<Status, RigError> {
 
 fn read_parameters(session: &mut Session) -> Result<Parameters, RigError> {
     let mut found = None;
-    session.ask("tell its parameters", Command::ReadParameters, |message| {
-        if let Telemetry::Parameters(parameters) = message {
-            found = Some(*parameters);
-        }
-    })?;
+    session.ask(
+        "report its parameters",
+        Command::ReadParameters,
+        |message| {
+            if let Telemetry::Parameters(parameters) = message {
+                found = Some(*parameters);
+            }
+        },
+    )?;
     found.ok_or(RigError::Silent)
 }
 
@@ -223,7 +227,7 @@ fn print_status(status: &Status, terminal: &mut Terminal) -> Result<(), Failure>
     terminal.table(&[
         ("state", format!("{:?}", status.state)),
         ("fault", fault),
-        ("interlocks that stand", standing(status.standing)),
+        ("active interlocks", standing(status.standing)),
         (
             "parameters",
             if status.stored {
@@ -335,7 +339,7 @@ fn record(
     match fault {
         None => Ok(()),
         Some(fault) => Err(Failure::Usage(format!(
-            "fault {fault:?}: the brake was dumped; the recording is kept. When the cause is gone: muslip rig clear"
+            "fault {fault:?}: the brake was released; the recording is kept. After removing the cause: muslip rig clear"
         ))),
     }
 }

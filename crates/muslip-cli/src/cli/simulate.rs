@@ -21,10 +21,10 @@ use super::terminal::Terminal;
 /// release. Sensors have the noise of the rig file's [noise]; brake columns are written where it has a
 /// [brake]. The same arguments give the same bytes.
 ///
-/// With --model the repaired model of `diagnose` is true: its base law, mechanisms and remainder make the
-/// drag, what it found on wheel and vehicle acts on them, and its noise is the sensors'. With --inputs the
-/// speeds, the load and all other columns are those of a recording, and only the drag is the model's:
-/// without noise, what `predict` says.
+/// With --model the run follows a repaired model of `diagnose`: base law, mechanisms and correction tables
+/// give the drag, the mechanisms of wheel and vehicle act on them, and the sensors have the model's noise.
+/// With --inputs all columns but the drag are taken from a recording; with --no-noise the drag is then the
+/// prediction of `predict`.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  \
 muslip simulate --rig rig.toml --out run.csv\n  \
@@ -33,35 +33,35 @@ muslip simulate --rig rig.toml --law magic-formula:10,1.65,0.9,0.3 --speed 60 --
 muslip simulate --model found/model.toml --seed 7 --out run.csv\n  \
 muslip simulate --model found/model.toml --inputs run3.csv --no-noise --out replayed.csv")]
 pub(super) struct Arguments {
-    /// Rig file (TOML); with --model it may be left out, the model has its rig.
+    /// Rig file (TOML); not needed with --model, which contains the rig.
     #[arg(long, value_name = "RIG.toml", required_unless_present = "model")]
     rig: Option<PathBuf>,
-    /// Repaired model that is true, as `diagnose` writes it.
+    /// Repaired model to simulate, as `diagnose` writes it.
     #[arg(long, value_name = "MODEL.toml", conflicts_with = "law")]
     model: Option<PathBuf>,
-    /// Recording whose inputs are replayed under --model.
+    /// Recording to take the inputs from; needs --model.
     #[arg(long, value_name = "RUN.csv", requires = "model",
         conflicts_with_all = ["speed", "normal_force", "applications", "duration", "rate_hz"])]
     inputs: Option<PathBuf>,
-    /// Write what noiseless sensors would read.
+    /// Simulate sensors without noise.
     #[arg(long)]
     no_noise: bool,
-    /// Where the recording goes.
+    /// File for the recording.
     #[arg(long, value_name = "RUN.csv")]
     out: PathBuf,
     /// True tyre law: rudd:MUP,SP, burckhardt:SURFACE, burckhardt:C1,C2,C3 or magic-formula:B,C,D,E
     /// [default: the rig file's].
     #[arg(long)]
     law: Option<RigLaw>,
-    /// Seed of the sensors' noise.
+    /// Seed of the sensor noise.
     #[arg(long, default_value_t = 1)]
     seed: u64,
-    /// Vehicle speed at the start in m/s [default: enough for the whole run; with --model the largest that
-    /// it was fitted on].
+    /// Vehicle speed at the start in m/s [default: enough for the whole run; with --model the largest in
+    /// its recordings].
     #[arg(long, value_name = "M/S", allow_negative_numbers = true)]
     speed: Option<f64>,
-    /// Normal force in N [default: the weight of the rig file's mass; with --model the mean that it was
-    /// fitted on].
+    /// Normal force in N [default: the weight of the rig file's mass; with --model the mean of
+    /// its recordings].
     #[arg(long, value_name = "N", allow_negative_numbers = true)]
     normal_force: Option<f64>,
     /// Brake applications.
@@ -75,7 +75,7 @@ pub(super) struct Arguments {
         default_value_t = 4.0
     )]
     duration: f64,
-    /// Rows a second [default: 500; with --model those of its recordings, at which its noise holds].
+    /// Rows per second [default: 500; with --model the rate of its recordings].
     #[arg(long, value_name = "HZ", allow_negative_numbers = true)]
     rate_hz: Option<f64>,
 }
@@ -102,7 +102,7 @@ pub(super) fn run(arguments: &Arguments, terminal: &mut Terminal) -> Result<(), 
     }
 }
 
-/// A complaint about what was asked for.
+/// A scenario that cannot be simulated.
 fn usage(error: &dyn std::error::Error) -> Failure {
     Failure::Usage(one_line(&error.to_string()))
 }
@@ -226,12 +226,12 @@ fn under_model(
         String::new()
     } else {
         format!(
-            "; its dependence on {} is left out: replay a recording that has it with --inputs",
+            "; without its dependence on {}: give a recording with that column as --inputs",
             columns.join(", ")
         )
     };
     terminal.line(&format!(
-        "{}: {} rows under the repaired model{left_out}",
+        "{}: {} rows simulated with the repaired model{left_out}",
         out.display(),
         rows.len()
     ))
@@ -263,10 +263,10 @@ fn replayed(
     write_exactly(OutputFile::create(out)?, out, origin, &names, rows)?;
     let outside = match replay.outside {
         0 => String::new(),
-        rows => format!("; {rows} of them outside its domain, where it extrapolates"),
+        rows => format!("; {rows} of them extrapolated, outside the model's domain"),
     };
     terminal.line(&format!(
-        "{}: {count} rows of {} under the repaired model{outside}",
+        "{}: {count} rows of {} simulated with the repaired model{outside}",
         out.display(),
         inputs.display()
     ))

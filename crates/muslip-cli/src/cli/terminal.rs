@@ -100,7 +100,7 @@ impl Terminal {
     }
 }
 
-/// One line on standard error. That nobody may be there to read it is no reason to fail differently.
+/// One line on standard error; a closed standard error changes no exit status.
 pub(super) fn complain(line: &str) {
     let _ = writeln!(anstream::stderr(), "{line}");
 }

@@ -22,7 +22,7 @@ const TRIES: u32 = 25;
 #[derive(Debug, thiserror::Error)]
 pub enum RigError {
     /// The port is gone.
-    #[error("the rig's port is gone: {0}")]
+    #[error("the connection to the rig is lost: {0}")]
     Port(#[from] io::Error),
     /// Nobody answers.
     #[error("no answer from the rig")]
@@ -46,12 +46,12 @@ pub enum RigError {
 fn reason(refusal: &Refusal) -> String {
     match refusal {
         Refusal::WrongState(state) => format!("it is in state {state:?}"),
-        Refusal::Interlock(fault) => format!("interlock {fault:?} stands"),
-        Refusal::Profile => "a figure of the profile is out of range".to_owned(),
+        Refusal::Interlock(fault) => format!("interlock {fault:?} is active"),
+        Refusal::Profile => "a parameter of the profile is out of range".to_owned(),
         Refusal::Parameter(index) => format!("{} is out of range", field_name(*index)),
         Refusal::Moving => "it is moving".to_owned(),
         Refusal::Storage => {
-            "the parameters hold until the next reset but could not be stored".to_owned()
+            "the parameters apply until the next reset but could not be stored".to_owned()
         }
     }
 }
@@ -86,7 +86,7 @@ impl Session {
         // Ends whatever half frame the controller may have in its reader.
         session.port.send(&[0])?;
         let mut hello = None;
-        session.ask("say hello", Command::Hello, |message| {
+        session.ask("report its version", Command::Hello, |message| {
             if let Telemetry::Hello(found) = message {
                 hello = Some(*found);
             }

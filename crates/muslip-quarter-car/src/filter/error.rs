@@ -63,7 +63,7 @@ pub enum ConfigParameter {
     Bank,
 }
 
-/// A configuration that makes no filter.
+/// Why a configuration is invalid.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]

@@ -141,7 +141,7 @@ fn on_drag(with: &Repaired, without: &Repaired, id: &str, run: &Run) -> Option<V
         Shape::Line(interrupted(line(&with_n, (from, to)))),
     );
     let whole = Figure::new(
-        format!("What {name} adds to the drag over all of {recording}: with it less without it."),
+        format!("Contribution of {name} to the drag over {recording}: model with it minus model without it."),
         Axis::new("time (s)"),
         Axis::new("difference of drag (N)"),
     )
@@ -149,7 +149,7 @@ fn on_drag(with: &Repaired, without: &Repaired, id: &str, run: &Run) -> Option<V
     .with(Ink::Reference, "", Shape::Level(0.0))
     .with(
         Ink::Estimate,
-        "with it less without it",
+        "contribution",
         Shape::Line(interrupted(line(&difference, (0, run.len())))),
     );
     Some(vec![close_up, whole])
@@ -202,7 +202,7 @@ fn on_balance(repaired: &Repaired, runs: &[Run], place: usize, id: &str) -> Vec<
                 .max_by(|a, b| largest(a.1).total_cmp(&largest(b.1)));
             if let Some((recording, imbalance)) = most {
                 let caption = format!(
-                    "What slows the {balance} beside all else in the model, as {name} has it, over {recording}."
+                    "Contribution of {name} to the {balance} balance over {recording}; positive slows the {balance}."
                 );
                 figures.push(
                     Figure::new(caption, Axis::new("time (s)"), up.clone())
@@ -232,8 +232,8 @@ fn on_balance(repaired: &Repaired, runs: &[Run], place: usize, id: &str) -> Vec<
     figures.push(
         Figure::new(
             format!(
-                "What slows the {balance} beside all else in the model, as recorded and as {name} has it (all \
-                 recordings)."
+                "Residual of the {balance} balance without {name}, and the contribution of {name} (all \
+                 recordings); positive slows the {balance}."
             ),
             Axis::new(along),
             up,
@@ -378,7 +378,7 @@ pub fn correction(correction: &Correction) -> Option<Figure> {
     let label = axis_label(&correction.variable);
     (points.len() > 1).then(|| {
         Figure::new(
-            format!("The correction of the {what}, for which there is no name."),
+            format!("Correction of the {what} that no named mechanism explains."),
             Axis::new(label),
             Axis::new(acts_on),
         )

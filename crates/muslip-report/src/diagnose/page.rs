@@ -194,7 +194,7 @@ fn names(diagnosis: &Diagnosis) -> Section {
             vec![Cell::from(row.label.to_owned()), text]
         });
         blocks.push(Block::Folded {
-            summary: "Equation, look-alikes, and what tells them apart".into(),
+            summary: "Equation, alternatives, and the tests that separate them".into(),
             table: of_cells(["", word], rows),
         });
     }
@@ -254,11 +254,13 @@ fn findings(diagnosis: &Diagnosis, views: &Views) -> Section {
     if blocks.is_empty() {
         blocks.push(Block::Paragraph(match diagnosis.verdict {
             Verdict::Undecided => {
-                "Nothing could be compared; the faults of the data, below, say why.".to_owned()
+                "Nothing could be compared: see the faults of the data below.".to_owned()
             }
-            _ => "Nothing. How large an effect would have been needed to be seen stands below, under \
-                  \u{201c}What was looked for\u{201d}."
-                .to_owned(),
+            _ => {
+                "Nothing. The smallest detectable effects are listed below, under \u{201c}What was \
+                  looked for\u{201d}."
+                    .to_owned()
+            }
         }));
     }
     section("What is missing", blocks)
@@ -294,7 +296,7 @@ fn mechanism_table(mechanism: &NamedMechanism, term: Option<&RepairedTerm>) -> B
     rows.push([
         "evidence".to_owned(),
         format!(
-            "BIC falls by {}; log likelihood on held-out data gains {} a sample; effect {} sigma of the noise (rms)",
+            "BIC falls by {}; log likelihood on held-out data gains {} per sample; effect {} sigma of the noise (rms)",
             significant(evidence.delta_bic, 3),
             significant(evidence.holdout_nll_gain_per_sample, 2),
             significant(mechanism.effect_sigma, 2),
@@ -367,7 +369,7 @@ fn places(diagnosis: &Diagnosis, views: &Views) -> Section {
             "balance",
             "operating region",
             "from, to",
-            "share of the mismatch",
+            "share of the error",
             "sigma",
         ];
         blocks.push(table(head, rows));
@@ -388,13 +390,13 @@ fn places(diagnosis: &Diagnosis, views: &Views) -> Section {
             .collect();
         if shown.len() < diagnosis.r#where.len() {
             blocks.push(Block::Paragraph(format!(
-                "The {} strongest of {} flagged stretches; diagnosis.json has all.",
+                "The {} strongest of {} flagged intervals; diagnosis.json has all.",
                 shown.len(),
                 diagnosis.r#where.len()
             )));
         }
         blocks.push(Block::Folded {
-            summary: "Flagged stretches as a table".into(),
+            summary: "Flagged intervals as a table".into(),
             table: Table::new(["recording", "balance", "channel", "time", "sigma"], rows),
         });
     }
@@ -470,7 +472,7 @@ fn looked_for(diagnosis: &Diagnosis) -> Section {
         [
             spoken(entry.id),
             what(entry.id),
-            "cannot show in these recordings".to_owned(),
+            "cannot be identified in these recordings".to_owned(),
             String::new(),
         ]
     }));
@@ -481,7 +483,7 @@ fn looked_for(diagnosis: &Diagnosis) -> Section {
         "mechanism",
         "what it is",
         "result",
-        "smallest effect that would have been seen",
+        "smallest detectable effect",
     ];
     let ids: BTreeMap<String, &str> = diagnosis
         .looked_for

@@ -38,7 +38,7 @@ pub fn chosen(diagnosis: &Diagnosis) -> Vec<&Trace> {
     traces
 }
 
-/// Drag against time: measured, the base law and the repaired model, flagged stretches shaded.
+/// Drag against time: measured, the base law and the repaired model, flagged intervals shaded.
 #[must_use]
 pub fn drag(diagnosis: &Diagnosis, trace: &Trace) -> Figure {
     let role = if trace.holdout { "held out" } else { "fitted" };
@@ -124,7 +124,7 @@ pub fn against_slip(diagnosis: &Diagnosis) -> Figure {
     .with(Ink::Estimate, "repaired model", Shape::Line(means(&after)))
 }
 
-/// Shades the flagged stretches of the tyre balance over the height of what is drawn.
+/// Shades the flagged intervals of the tyre balance over the height of what is drawn.
 fn shaded(mut figure: Figure, diagnosis: &Diagnosis, trace: &Trace, drawn: &[&[f64]]) -> Figure {
     let finite = drawn
         .iter()

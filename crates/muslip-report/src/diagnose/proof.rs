@@ -34,18 +34,18 @@ pub(super) fn proof(diagnosis: &Diagnosis) -> Section {
             [
                 "drag predicted on",
                 "RMSE",
-                "negative log likelihood a sample",
+                "negative log likelihood per sample",
                 "whiteness p",
             ],
             rows,
         ));
         let proof = if diagnosis.recordings.iter().any(|r| r.role == Role::Holdout) {
-            "Held-out recordings were seen by no parameter and no choice of mechanism."
+            "Held-out recordings were used neither to fit a parameter nor to choose a mechanism."
         } else {
-            "Held-out blocks of the recording were seen by no parameter and no choice of mechanism."
+            "Held-out blocks of the recording were used neither to fit a parameter nor to choose a mechanism."
         };
-        let whiteness = "Whiteness p: how likely chance alone leaves as much structure in the errors; a small \
-                         value means that something is left.";
+        let whiteness = "Whiteness p: probability of as much correlation in white errors; a small value means \
+                         that structure remains in the errors.";
         blocks.push(Block::Paragraph(
             if fit.holdout.before == Score::default() {
                 whiteness.to_owned()

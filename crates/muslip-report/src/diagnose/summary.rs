@@ -1,4 +1,4 @@
-//! The diagnosis on a terminal: what an engineer would write in a mail.
+//! Summary of a diagnosis for the terminal.
 
 use std::path::Path;
 
@@ -175,12 +175,12 @@ fn places(diagnosis: &Diagnosis) -> Vec<String> {
         .filter_map(|(balance, intervals)| {
             let strongest = intervals.iter().max_by(|a, b| a.z.total_cmp(&b.z))?;
             let total: f64 = intervals.iter().map(|i| i.end_s - i.start_s).sum();
-            let stretches = match intervals.len() {
-                1 => "1 stretch".to_owned(),
-                many => format!("{many} stretches"),
+            let count = match intervals.len() {
+                1 => "1 interval".to_owned(),
+                many => format!("{many} intervals"),
             };
             Some(format!(
-                "{} balance, {}: {stretches}, {} s in all; strongest {} {} ({}).",
+                "{} balance, {}: {count}, {} s in total; strongest {} {} ({}).",
                 capitalised(balance),
                 strongest.channel,
                 significant(total, 3),
@@ -197,7 +197,7 @@ fn places(diagnosis: &Diagnosis) -> Vec<String> {
         .map(|region| {
             let values = range(&region.variable, region.low, region.high);
             format!(
-                "{} of it at {} {values}",
+                "{} of the error at {} {values}",
                 percent(region.share),
                 variable(&region.variable)
             )
@@ -229,7 +229,7 @@ fn improvement(diagnosis: &Diagnosis) -> Vec<String> {
         let error = diagnosis.fit.fit.before.rmse_n;
         return if error > 0.0 {
             vec![format!(
-                "Drag RMSE {} N, which is its noise.",
+                "Drag RMSE {} N: noise alone.",
                 significant(error, 3)
             )]
         } else {
@@ -241,7 +241,7 @@ fn improvement(diagnosis: &Diagnosis) -> Vec<String> {
             "Drag RMSE on held-out data {holdout}; on fitted data {fit}."
         )],
         (true, false) => vec![format!(
-            "Drag RMSE on fitted data {fit}; no held-out proof."
+            "Drag RMSE on fitted data {fit}; nothing was held out."
         )],
         (true, true) => Vec::new(),
     }
@@ -294,10 +294,7 @@ fn unnoticed(diagnosis: &Diagnosis) -> Vec<String> {
             .take(most)
             .map(|(entry, effect)| format!("{} {}", spoken(entry.id), least(effect)))
             .collect();
-        texts.push(format!(
-            "Would have gone unnoticed below: {}.",
-            effects.join(", ")
-        ));
+        texts.push(format!("Smallest detectable: {}.", effects.join(", ")));
     }
     texts
 }

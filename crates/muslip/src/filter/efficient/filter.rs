@@ -5,7 +5,7 @@ use crate::filter::{Decision, Estimator, FrictionMeasurement, PeakEstimate};
 use crate::real::Real;
 
 /// One update without a check, for the cost table and the throughput example: a slip, friction or variance that
-/// is not finite, or a variance that is not positive, spoils the estimate, and nothing tells.
+/// is not finite, or a variance that is not positive, makes the estimate wrong without an error.
 #[doc(hidden)]
 #[inline]
 pub fn update_unchecked<T: Real>(

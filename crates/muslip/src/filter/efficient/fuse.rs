@@ -19,11 +19,11 @@ const UNLEARNT_NOISE: f64 = 8.0;
 /// The gate believes the noise to be at most this many times the declared variance (twice its deviation):
 /// outliers that were let in must not open it to others.
 const LARGEST_GATE_FACTOR: f64 = 4.0;
-/// Growth of the learnt noise variance by which outliers are looked for.
+/// Growth of the learnt noise variance from which outliers are searched for.
 const GROWN: f64 = 1.6;
-/// The noise seems to be so many times the declared variance that outliers are looked for.
+/// Ratio of the apparent noise variance to the declared one from which outliers are searched for.
 const DOUBTFUL_FACTOR: f64 = 2.5;
-/// So many times that there must be outliers: it is declared to ±50 %.
+/// The same ratio from which outliers are taken as certain: the noise is declared to ±50 %.
 const CONTAMINATED_FACTOR: f64 = 5.0;
 /// Most samples between two renewals.
 const MOST_SAMPLES_BETWEEN: u32 = 8192;

@@ -8,10 +8,10 @@ use crate::real::{QUARTER_BINADES, Real};
 pub(super) const MOST_SAMPLES: f64 = 8.0;
 /// Residual, in noise variances, beyond which the only sample of a bin is an outlier.
 const CONVICTED: f64 = 15.0;
-/// The same where the noise seems larger than it may be: then there are outliers.
+/// The same where the noise is larger than declared noise can be: then outliers are certain.
 const CONVICTED_IF_CONTAMINATED: f64 = 9.0;
-/// Learnt over declared noise variance from which there must be outliers: noise is declared to ±50 %,
-/// which makes four, and the chance of 41 samples.
+/// Learnt over declared noise variance from which outliers are certain: noise is declared to ±50 %, a factor
+/// of four in variance, and 41 samples scatter by the rest.
 const CONTAMINATED: f64 = 5.5;
 /// More for each other sample of the bin.
 const CONVICTED_MORE: f64 = 3.0;

@@ -55,7 +55,7 @@ pub enum ConfigParameter {
     NisGate,
 }
 
-/// A configuration that makes no filter.
+/// Why a configuration is invalid.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]

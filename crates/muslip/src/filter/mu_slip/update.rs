@@ -355,8 +355,8 @@ impl<T: Real> Lean<T> {
     }
 }
 
-/// One update by the lean arithmetic without a check, for the cost table and the throughput example: what is
-/// outside the ranges of [`Inputs`] spoils the result, and nothing tells.
+/// One update by the lean arithmetic without a check, for the cost table and the throughput example: an
+/// input outside the ranges of [`Inputs`] makes the result wrong without an error.
 #[doc(hidden)]
 #[inline]
 #[must_use]
