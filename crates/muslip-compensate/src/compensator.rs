@@ -155,7 +155,7 @@ impl<T: Real> Compensation<T> {
     /// The compensator, before its first step, with room for `N` samples in its delay line.
     ///
     /// N may be 0 where no delay is compensated; else it must be at least
-    /// ⌈[`delay_s`](ForceDelay::delay_s)/[`sampling_step_s`](ForceDelay::sampling_step_s)⌉ + 1, and more
+    /// ⌈[`delay_s`](crate::ForceDelay::delay_s)/[`sampling_step_s`](crate::ForceDelay::sampling_step_s)⌉ + 1, and more
     /// where the step jitters. `declared_radius_m` is the wheel's free-rolling radius in m, > 0, that
     /// relative errors refer to. Memory: 4 N + some 40 numbers.
     ///

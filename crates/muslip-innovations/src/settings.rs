@@ -108,7 +108,7 @@ pub struct Forming<T> {
     pub gate_stds: T,
 }
 
-/// Everything that the balances need to know. `build` it into a [`Monitor`](crate::Monitor).
+/// Everything that the balances need to know. `build` it into a [`Monitor`](crate::monitor::Monitor).
 ///
 /// Sizes of noise are not fitted here, as a diagnosis of recordings does: false alarms are as stated only where
 /// they are as stated. Too large they make the monitor blind, too small they raise alarms.
