@@ -139,7 +139,9 @@ pub fn noise_sentence(survey: &Survey) -> String {
     }
 }
 
-fn capitalised(word: &str) -> String {
+/// The first letter large.
+#[must_use]
+pub fn capitalised(word: &str) -> String {
     let mut letters = word.chars();
     letters
         .next()

@@ -29,6 +29,11 @@ impl InputError {
             problem,
         }
     }
+
+    /// What the system says against reading a file.
+    pub fn unreadable(path: &Path, error: &std::io::Error) -> Self {
+        Self::whole_file(path, InputProblem::Unreadable(system_reason(error)))
+    }
 }
 
 /// What can be wrong with a recording or a rig file.

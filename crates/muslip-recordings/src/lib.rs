@@ -33,3 +33,4 @@ mod optional;
 pub mod output;
 pub mod recording;
 pub mod rig_file;
+pub mod toml_file;

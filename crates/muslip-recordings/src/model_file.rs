@@ -12,8 +12,9 @@ use muslip_diagnose::repaired::{Correction, NoiseModel, Predicting, Repaired, Re
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-use crate::input_error::{InputError, InputProblem, one_line, quoted, system_reason};
-use crate::rig_file::{self, LARGEST_RADIUS_M, RigFile, SMALLEST_RADIUS_M};
+use crate::input_error::{InputError, InputProblem, one_line, quoted};
+use crate::rig_file::{LARGEST_RADIUS_M, RigFile, SMALLEST_RADIUS_M};
+use crate::toml_file;
 
 /// The only format that there is.
 const SCHEMA: &str = "muslip.model/1";
@@ -73,10 +74,7 @@ impl ModelFile {
     /// [`InputError`], one line with file, line and column: the file is missing, not UTF-8, not TOML, or
     /// names or holds what this program cannot run.
     pub fn read(path: &Path) -> Result<Self, InputError> {
-        let bytes = fs::read(path).map_err(|error| {
-            InputError::whole_file(path, InputProblem::Unreadable(system_reason(&error)))
-        })?;
-        Self::parse(path, &bytes)
+        Self::parse(path, &toml_file::bytes_of(path)?)
     }
 
     /// Checks the text of a model file; `path` is only named in errors.
@@ -84,19 +82,15 @@ impl ModelFile {
     /// # Errors
     /// As [`ModelFile::read`].
     pub fn parse(path: &Path, bytes: &[u8]) -> Result<Self, InputError> {
-        let text = rig_file::text_of(path, bytes)?;
-        let repaired: Repaired = toml::from_str(text).map_err(|error| {
-            let at = error.span().map_or(0, |span| span.start);
-            let problem = InputProblem::Toml(one_line(error.message()));
-            rig_file::error_at(path, text, at, problem)
-        })?;
+        let text = toml_file::text_of(path, bytes)?;
+        let repaired: Repaired = toml_file::parsed(path, text)?;
         if let Some(complaint) = complaint(&repaired) {
             let problem = InputProblem::Model {
                 key: complaint.key_text(),
                 what: complaint.what,
             };
             let at = place(text, &complaint.key);
-            return Err(rig_file::error_at(path, text, at, problem));
+            return Err(toml_file::error_at(path, text, at, problem));
         }
         Ok(Self {
             path: path.to_owned(),
@@ -164,7 +158,7 @@ impl ModelFile {
             .map(|name| Step::Name(name.to_owned()))
             .collect();
         let text = fs::read_to_string(rig_path).unwrap_or_default();
-        Err(rig_file::error_at(
+        Err(toml_file::error_at(
             rig_path,
             &text,
             place(&text, &steps),

@@ -2,13 +2,13 @@
 //! and the noise of each channel.
 
 use std::collections::BTreeMap;
-use std::fs;
 use std::path::Path;
 
 use serde::Deserialize;
 use toml::Spanned;
 
-use crate::input_error::{InputError, InputProblem, one_line, quoted, shown, system_reason};
+use crate::input_error::{InputError, InputProblem, one_line, quoted, shown};
+use crate::toml_file;
 
 /// Smallest wheel radius that is taken for a wheel, in m.
 pub const SMALLEST_RADIUS_M: f64 = 0.005;
@@ -75,10 +75,7 @@ impl RigFile {
     /// TOML, lacks a required key, names an unknown tyre law, or has a value that is not finite, not
     /// positive, or no wheel's radius.
     pub fn read(path: &Path) -> Result<Self, InputError> {
-        let bytes = fs::read(path).map_err(|error| {
-            InputError::whole_file(path, InputProblem::Unreadable(system_reason(&error)))
-        })?;
-        Self::parse(path, &bytes)
+        Self::parse(path, &toml_file::bytes_of(path)?)
     }
 
     /// Checks the text of a rig file; `path` is only named in errors.
@@ -86,15 +83,9 @@ impl RigFile {
     /// # Errors
     /// As [`RigFile::read`].
     pub fn parse(path: &Path, bytes: &[u8]) -> Result<Self, InputError> {
-        let text = text_of(path, bytes)?;
-        let fail = |at, problem| error_at(path, text, at, problem);
-        let written: Written = toml::from_str(text).map_err(|error| {
-            fail(
-                error.span().map_or(0, |span| span.start),
-                InputProblem::Toml(one_line(error.message())),
-            )
-        })?;
-        written.checked(fail)
+        let text = toml_file::text_of(path, bytes)?;
+        let written: Written = toml_file::parsed(path, text)?;
+        written.checked(|at, problem| toml_file::error_at(path, text, at, problem))
     }
 }
 
@@ -223,27 +214,6 @@ impl Written {
             },
             noise,
         })
-    }
-}
-
-/// The text of a file without its byte order mark.
-pub(crate) fn text_of<'a>(path: &Path, bytes: &'a [u8]) -> Result<&'a str, InputError> {
-    let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
-    str::from_utf8(bytes).map_err(|error| {
-        let valid = String::from_utf8_lossy(&bytes[..error.valid_up_to()]);
-        error_at(path, &valid, valid.len(), InputProblem::NotUtf8)
-    })
-}
-
-/// A problem at a byte of a file's text.
-pub(crate) fn error_at(path: &Path, text: &str, byte: usize, problem: InputProblem) -> InputError {
-    let before = text.get(..byte).unwrap_or(text);
-    let line_start = before.rfind('\n').map_or(0, |newline| newline + 1);
-    InputError {
-        path: path.to_owned(),
-        line: before.matches('\n').count() as u64 + 1,
-        column: before[line_start..].chars().count() as u64 + 1,
-        problem,
     }
 }
 

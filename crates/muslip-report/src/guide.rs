@@ -3,7 +3,8 @@
 use std::fmt::Write as _;
 
 use host_sim::{ModelRunError, RunError, Scenario, ScenarioError};
-use muslip_analysis::diagnose::wording::{capitalised, listed, spoken};
+use muslip_analysis::diagnose::wording::{listed, spoken};
+use muslip_analysis::wording::capitalised;
 use muslip_diagnose::campaign::Run;
 use muslip_diagnose::data::Data;
 use muslip_diagnose::mechanism::{Compensation, Id, Stage};

@@ -1,9 +1,12 @@
 //! Text for a terminal: running text and tables, within a width.
 
-use std::io;
+use std::io::{self, Write};
 
 /// Narrowest terminal that lines are broken for.
 const NARROWEST: usize = 40;
+
+/// Widest line of running text: longer ones are hard to read.
+pub const WIDEST_RUNNING_TEXT: usize = 84;
 
 /// Columns of the terminal, or as many as `COLUMNS` says; `None` in a pipe or a file otherwise.
 #[must_use]
@@ -127,6 +130,35 @@ impl Table {
         let body: String = self.rows.iter().map(|cells| row(cells)).collect();
         row(&self.head) + &rule + &body
     }
+}
+
+/// Writes tables under their headings, then paragraphs, as wide as the terminal is.
+///
+/// # Errors
+/// What `out` answers.
+pub fn write_tables(
+    out: &mut impl Write,
+    tables: &[(&str, Table)],
+    paragraphs: &[String],
+) -> io::Result<()> {
+    let columns = columns();
+    let room = columns.unwrap_or(usize::MAX);
+    for (heading, table) in tables {
+        for line in wrapped(heading, room)
+            .into_iter()
+            .chain(table.lines(columns))
+        {
+            writeln!(out, "{line}")?;
+        }
+        writeln!(out)?;
+    }
+    for paragraph in paragraphs {
+        for line in wrapped(paragraph, room.min(WIDEST_RUNNING_TEXT)) {
+            writeln!(out, "{line}")?;
+        }
+        writeln!(out)?;
+    }
+    Ok(())
 }
 
 /// A row's lines.

@@ -381,11 +381,7 @@ fn outline(step: &Step) -> Vec<(f64, f64)> {
 }
 
 fn result(steps: &[Step]) -> Figure {
-    let state_of = |state: State<f64>| Curve {
-        peak_friction: state.peak_friction,
-        critical_slip: state.critical_slip,
-    };
-    let start = state_of(Range::Aircraft.initial_state());
+    let start = curve_of(Range::Aircraft.initial_state());
     let measured = along(steps, |step| step.fusion.measured_friction);
     let mut figure = Figure::new(
         "Start and end: the curve that the filter starts from, the points, what it makes of them, and the \
@@ -401,27 +397,41 @@ fn result(steps: &[Step]) -> Figure {
     .with(Ink::Truth, "true curve", Shape::Line(points_of(TRUTH)))
     .with(Ink::Measured, "measured", Shape::Points(measured));
     if let Some(step) = steps.last() {
-        let curve = state_of(step.estimate.state);
+        let curve = curve_of(step.estimate.state);
         let (peak_std, slip_std) = step.estimate.covariance.std();
         let words = format!(
             "{:.3} \u{b1} {peak_std:.3} at slip {:.3} \u{b1} {slip_std:.3}",
             curve.peak_friction, curve.critical_slip
         );
-        figure = figure
-            .with(
-                Ink::Estimate,
-                "1-sigma of the peak",
-                Shape::Outline(outline(step)),
-            )
-            .with(Ink::Estimate, "estimate", Shape::Line(points_of(curve)))
-            .with(
-                Ink::Estimate,
-                "",
-                Shape::Marker((curve.critical_slip, curve.peak_friction), String::new()),
-            );
+        figure = with_estimate(figure, step);
         figure.caption = format!("{} Peak friction {words}.", figure.caption);
     }
     figure
+}
+
+/// The curve of a filter's state.
+fn curve_of(state: State<f64>) -> Curve {
+    Curve {
+        peak_friction: state.peak_friction,
+        critical_slip: state.critical_slip,
+    }
+}
+
+/// Adds the curve of an estimate, its peak and that peak's 1-sigma ellipse.
+fn with_estimate(figure: Figure, step: &Step) -> Figure {
+    let curve = curve_of(step.estimate.state);
+    figure
+        .with(
+            Ink::Estimate,
+            "1-sigma of the peak",
+            Shape::Outline(outline(step)),
+        )
+        .with(Ink::Estimate, "estimate", Shape::Line(points_of(curve)))
+        .with(
+            Ink::Estimate,
+            "",
+            Shape::Marker((curve.critical_slip, curve.peak_friction), String::new()),
+        )
 }
 
 fn still(index: usize, steps: &[Step]) -> Figure {
@@ -445,10 +455,6 @@ fn still(index: usize, steps: &[Step]) -> Figure {
         let state = step.estimate.state;
         let covariance = step.estimate.covariance;
         let (peak_std, slip_std) = covariance.std();
-        let curve = Curve {
-            peak_friction: state.peak_friction,
-            critical_slip: state.critical_slip,
-        };
         figure.caption = format!(
             "After measurement {index} of {last}, slip {:.4}: peak friction {:.3}\u{a0}±\u{a0}{:.3}, critical \
              slip {:.3}\u{a0}±\u{a0}{:.3}, correlation {:.2}.",
@@ -459,18 +465,7 @@ fn still(index: usize, steps: &[Step]) -> Figure {
             slip_std,
             covariance.correlation()
         );
-        figure = figure
-            .with(
-                Ink::Estimate,
-                "1-sigma of the peak",
-                Shape::Outline(outline(step)),
-            )
-            .with(Ink::Estimate, "estimate", Shape::Line(points_of(curve)))
-            .with(
-                Ink::Estimate,
-                "",
-                Shape::Marker((state.critical_slip, state.peak_friction), String::new()),
-            );
+        figure = with_estimate(figure, step);
     }
     figure
 }

@@ -9,15 +9,12 @@ use anyhow::{Context, Result};
 use clap::Parser;
 use indicatif::ProgressBar;
 use muslip_recordings::output::{create_folder, write_file};
-use muslip_report::text::{columns, wrapped};
+use muslip_report::text::write_tables;
 use muslip_report::{FigureFormat, write_figures};
 use study_article::{
     CONVERGENCE_PAGE, Paper, PaperOptions, article_markdown, convergence_page, figures,
     report_page, reproduce, work,
 };
-
-/// Widest line of running text.
-const WIDEST_LINE: usize = 84;
 
 /// Reproduce the article that the filter comes from: its statements, its figures, its errors.
 ///
@@ -92,8 +89,7 @@ fn write_all(paper: &Paper, folder: &Path, format: FigureFormat) -> Result<Vec<P
 }
 
 fn tell(paper: &Paper, out: &mut impl Write) -> Result<()> {
-    let columns = columns();
-    for (heading, table) in [
+    let tables = [
         (
             "The article's statements beside ours",
             paper.statements_table(),
@@ -102,19 +98,7 @@ fn tell(paper: &Paper, out: &mut impl Write) -> Result<()> {
             "Errors against the Cramér-Rao bound (in brackets: standard error of the last digits)",
             paper.yardstick_table(),
         ),
-    ] {
-        for line in wrapped(heading, columns.unwrap_or(usize::MAX)) {
-            writeln!(out, "{line}")?;
-        }
-        for line in table.lines(columns) {
-            writeln!(out, "{line}")?;
-        }
-        writeln!(out)?;
-    }
-    let width = columns.unwrap_or(usize::MAX).min(WIDEST_LINE);
-    for line in wrapped(&paper.missing_estimates(), width) {
-        writeln!(out, "{line}")?;
-    }
-    writeln!(out)?;
+    ];
+    write_tables(out, &tables, &[paper.missing_estimates()])?;
     Ok(())
 }

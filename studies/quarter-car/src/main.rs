@@ -9,12 +9,9 @@ use anyhow::Result;
 use clap::Parser;
 use indicatif::ProgressBar;
 use muslip_recordings::output::{create_folder, write_file};
-use muslip_report::text::{columns, wrapped};
+use muslip_report::text::write_tables;
 use muslip_report::{FigureFormat, write_figures};
 use study_quarter_car::{Study, StudyOptions, figures, markdown, report_page, study, work};
-
-/// Widest line of running text.
-const WIDEST_LINE: usize = 84;
 
 /// Brake a simulated quarter car on estimates from wheel speed: figures, comparison, Monte Carlo.
 ///
@@ -89,9 +86,7 @@ fn write_all(study: &Study, folder: &Path, format: FigureFormat) -> Result<Vec<P
 }
 
 fn tell(study: &Study, out: &mut impl Write) -> Result<()> {
-    let columns = columns();
-    let room = columns.unwrap_or(usize::MAX);
-    for (heading, table) in [
+    let tables = [
         ("The best stop (e)", study.references_table()),
         ("Distance over that of (e)", study.comparison_table()),
         (
@@ -112,20 +107,7 @@ fn tell(study: &Study, out: &mut impl Write) -> Result<()> {
             study.faults_table(),
         ),
         ("What five samples tell", study.observability_table()),
-    ] {
-        for line in wrapped(heading, room) {
-            writeln!(out, "{line}")?;
-        }
-        for line in table.lines(columns) {
-            writeln!(out, "{line}")?;
-        }
-        writeln!(out)?;
-    }
-    for line in wrapped(&study.foreign_verdict(), room.min(WIDEST_LINE)) {
-        writeln!(out, "{line}")?;
-    }
-    for line in wrapped(&study.verdict(), room) {
-        writeln!(out, "{line}")?;
-    }
+    ];
+    write_tables(out, &tables, &[study.foreign_verdict(), study.verdict()])?;
     Ok(())
 }

@@ -1,5 +1,6 @@
 //! Sentences of a diagnosis, the same in the terminal and in the report.
 
+use crate::wording::capitalised;
 use muslip_diagnose::mechanism::Id;
 use muslip_diagnose::outcome::{
     BeforeAfter, ChainFinding, Diagnosis, LookedFor, MinimumDetectable, NamedMechanism,
@@ -364,16 +365,6 @@ pub fn stretch(start_s: f64, end_s: f64) -> String {
         number(start_s)
     };
     with_unit(text.replace(' ', NO_BREAK), "s")
-}
-
-/// The first letter large.
-#[must_use]
-pub fn capitalised(word: &str) -> String {
-    let mut letters = word.chars();
-    letters
-        .next()
-        .map(|first| first.to_uppercase().chain(letters).collect())
-        .unwrap_or_default()
 }
 
 #[cfg(test)]

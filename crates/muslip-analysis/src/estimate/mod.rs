@@ -167,19 +167,19 @@ pub fn estimate<W: Write>(
         EstimatorKind::Article => Filter::Article(Config::for_range(range).build()?),
         EstimatorKind::Efficient => Filter::Efficient(efficient::Config::for_range(range).build()?),
     };
-    let mut result = run(
-        filter,
-        front,
-        recording,
+    let run = run(filter, front, recording, &survey, trace, &mut progress)?;
+    Ok(EstimateResult {
         options,
+        estimator: kind,
+        range,
+        peak: run.peak,
+        used: run.used,
+        skipped: run.skipped,
+        model,
         survey,
-        trace,
-        &mut progress,
-    )?;
-    result.model = model;
-    result.estimator = kind;
-    result.range = range;
-    Ok(result)
+        consistency: run.consistency,
+        record: run.record,
+    })
 }
 
 /// One of the filters.
@@ -305,22 +305,30 @@ impl Front {
     }
 }
 
+/// What a filter made of a recording.
+struct Run {
+    peak: PeakEstimate<f64>,
+    used: u64,
+    skipped: Skipped,
+    consistency: Consistency,
+    record: Record,
+}
+
 fn run<W: Write>(
     mut filter: Filter,
     mut front: Front,
     recording: &mut Recording,
-    options: EstimateOptions,
-    survey: Survey,
+    survey: &Survey,
     mut trace: Option<&mut TraceWriter<W>>,
     progress: &mut dyn FnMut(u64),
-) -> Result<EstimateResult, EstimateError> {
+) -> Result<Run, EstimateError> {
     let mut test = ConsistencyTest::default();
     let mut recorder = Recorder::new(filter.peak());
     let mut used = 0;
     let mut refused = 0;
     let mut outcome = Ok(());
     let mut take = |row: &Row<'_>| -> Result<(), EstimateError> {
-        let Some(measured) = front.measured(row, &survey, &filter.estimate().state) else {
+        let Some(measured) = front.measured(row, survey, &filter.estimate().state) else {
             return Ok(());
         };
         recorder.offered(&measured.measurement);
@@ -350,15 +358,10 @@ fn run<W: Write>(
         let problem = InputProblem::NoUsableSample(skipped.in_words());
         return Err(InputError::whole_file(recording.path(), problem).into());
     };
-    Ok(EstimateResult {
-        options,
-        estimator: EstimatorKind::Article,
-        range: Range::default(),
+    Ok(Run {
         peak: filter.peak(),
         used,
         skipped,
-        model: None,
-        survey,
         consistency,
         record: recorder.finish(),
     })

@@ -333,30 +333,15 @@ fn estimator_words(result: &EstimateResult) -> String {
 
 /// The result below its headline.
 pub(super) fn tell(result: &EstimateResult, terminal: &mut Terminal) -> Result<(), Failure> {
-    let peak = &result.peak;
     let skipped = match result.skipped.total() {
         0 => "none skipped".to_owned(),
         total => format!("{total} skipped ({})", result.skipped.in_words()),
     };
-    terminal.table(&[
-        (
-            "peak friction",
-            format!(
-                "{:.5}  1-sigma {:.5}",
-                peak.peak_friction, peak.peak_friction_std
-            ),
-        ),
-        (
-            "critical slip",
-            format!(
-                "{:.5}  1-sigma {:.5}",
-                peak.critical_slip, peak.critical_slip_std
-            ),
-        ),
-        ("correlation", format!("{:.3}", peak.correlation)),
+    let others = vec![
         ("samples", format!("{} used, {skipped}", result.used)),
         ("estimator", estimator_words(result)),
-    ])?;
+    ];
+    terminal.peak_table(&result.peak, others)?;
     terminal.line("")?;
     for sentence in result.model.iter().flat_map(model_sentences) {
         terminal.paragraph(&sentence)?;

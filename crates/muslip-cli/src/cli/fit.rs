@@ -73,21 +73,6 @@ fn tell(result: &FitResult, terminal: &mut Terminal) -> Result<(), Failure> {
         "not converged: iteration limit reached"
     };
     let mut rows = vec![
-        (
-            "peak friction",
-            format!(
-                "{:.5}  1-sigma {:.5}",
-                peak.peak_friction, peak.peak_friction_std
-            ),
-        ),
-        (
-            "critical slip",
-            format!(
-                "{:.5}  1-sigma {:.5}",
-                peak.critical_slip, peak.critical_slip_std
-            ),
-        ),
-        ("correlation", format!("{:.3}", peak.correlation)),
         ("rmse of friction", format!("{:.5}", fit.rmse_friction)),
         ("iterations", format!("{}, {ended}", fit.iterations)),
     ];
@@ -106,7 +91,7 @@ fn tell(result: &FitResult, terminal: &mut Terminal) -> Result<(), Failure> {
             ),
         ));
     }
-    terminal.table(&rows)?;
+    terminal.peak_table(&peak, rows)?;
     if let Some(factor) = result.understatement() {
         terminal.line("")?;
         terminal.paragraph(&format!(

@@ -3,12 +3,10 @@
 use std::io::{self, IsTerminal, Write};
 
 use clap::builder::styling::{AnsiColor, Style};
-use muslip_report::text::{columns, wrapped};
+use muslip::filter::PeakEstimate;
+use muslip_report::text::{WIDEST_RUNNING_TEXT, columns, wrapped};
 
 use super::failure::Failure;
-
-/// Widest line of running text.
-const WIDEST_LINE: usize = 84;
 
 /// Standard output. Colours and bold only where it is a terminal and `NO_COLOR` does not forbid them.
 pub(super) struct Terminal {
@@ -60,7 +58,7 @@ impl Terminal {
 
     /// Prints running text, wrapped.
     pub(super) fn paragraph(&mut self, text: &str) -> Result<(), Failure> {
-        for line in wrapped(text, self.width(WIDEST_LINE)) {
+        for line in wrapped(text, self.width(WIDEST_RUNNING_TEXT)) {
             self.line(&line)?;
         }
         Ok(())
@@ -84,6 +82,28 @@ impl Terminal {
             }
         }
         Ok(())
+    }
+
+    /// Prints peak friction and critical slip, then other names and values, in two columns.
+    pub(super) fn peak_table(
+        &mut self,
+        peak: &PeakEstimate<f64>,
+        others: Vec<(&str, String)>,
+    ) -> Result<(), Failure> {
+        let with_std = |value: f64, std: f64| format!("{value:.5}  1-sigma {std:.5}");
+        let mut rows = vec![
+            (
+                "peak friction",
+                with_std(peak.peak_friction, peak.peak_friction_std),
+            ),
+            (
+                "critical slip",
+                with_std(peak.critical_slip, peak.critical_slip_std),
+            ),
+            ("correlation", format!("{:.3}", peak.correlation)),
+        ];
+        rows.extend(others);
+        self.table(&rows)
     }
 
     /// Prints JSON and nothing else.

@@ -10,7 +10,7 @@ use muslip::sample::RigSample;
 use super::header::{Channel, Header, Required};
 use super::position::{Place, line_and_column};
 use super::utf8::{NotUtf8At, Utf8Reader};
-use crate::input_error::{InputError, InputProblem, quoted, shown, system_reason};
+use crate::input_error::{InputError, InputProblem, quoted, shown};
 
 const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
 
@@ -31,7 +31,7 @@ impl Recording {
     /// # Errors
     /// [`InputError`] if there is no such file or it cannot be read.
     pub fn open(path: &Path) -> Result<Self, InputError> {
-        let fail = |error| unreadable(path, &error);
+        let fail = |error| InputError::unreadable(path, &error);
         let mut file = File::open(path).map_err(fail)?;
         let metadata = file.metadata().map_err(fail)?;
         if metadata.is_dir() {
@@ -65,7 +65,8 @@ impl Recording {
     /// # Errors
     /// [`InputError`] if there is no such file.
     pub fn announced_length_bytes(path: &Path) -> Result<u64, InputError> {
-        let metadata = std::fs::metadata(path).map_err(|error| unreadable(path, &error))?;
+        let metadata =
+            std::fs::metadata(path).map_err(|error| InputError::unreadable(path, &error))?;
         Ok(if metadata.is_file() {
             metadata.len()
         } else {
@@ -143,7 +144,7 @@ impl Recording {
         (&self.file)
             .seek(SeekFrom::Start(self.text_start))
             .map(|_| ())
-            .map_err(|error| unreadable(&self.path, &error))
+            .map_err(|error| InputError::unreadable(&self.path, &error))
     }
 
     fn error_at_cell(&self, record_from: u64, cell: usize, problem: InputProblem) -> InputError {
@@ -176,13 +177,9 @@ impl Recording {
             .and_then(|inner| inner.downcast_ref::<NotUtf8At>())
         {
             Some(&NotUtf8At(byte)) => self.error_at(Place::Byte(byte), InputProblem::NotUtf8),
-            None => unreadable(&self.path, &error),
+            None => InputError::unreadable(&self.path, &error),
         }
     }
-}
-
-fn unreadable(path: &Path, error: &io::Error) -> InputError {
-    InputError::whole_file(path, InputProblem::Unreadable(system_reason(error)))
 }
 
 /// One pass over the rows of a recording.

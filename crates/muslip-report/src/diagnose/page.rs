@@ -3,10 +3,11 @@
 use std::collections::BTreeMap;
 
 use muslip_analysis::diagnose::wording::{
-    NO_BREAK, capitalised, least, mechanism_sentence, percent, quantity, quantity_apart, range,
-    short_name, sigmas, significant, spoken, stretch, unexplained_sentence, unseen, variable,
-    verdict_sentence, with_unit,
+    NO_BREAK, least, mechanism_sentence, percent, quantity, quantity_apart, range, short_name,
+    sigmas, significant, spoken, stretch, unexplained_sentence, unseen, variable, verdict_sentence,
+    with_unit,
 };
+use muslip_analysis::wording::capitalised;
 use muslip_diagnose::mechanism::Id;
 use muslip_diagnose::outcome::{
     Diagnosis, Interval, MinimumDetectable, NamedMechanism, Role, Verdict,

@@ -3,10 +3,11 @@
 use std::path::Path;
 
 use muslip_analysis::diagnose::wording::{
-    capitalised, chain_sentence, confusable_sentence, either, gain, least, mechanism_sentence,
-    percent, range, short_name, sigmas, significant, spoken, stretch, unexplained_sentence, unseen,
-    variable, verdict_sentence, with_unit,
+    chain_sentence, confusable_sentence, either, gain, least, mechanism_sentence, percent, range,
+    short_name, sigmas, significant, spoken, stretch, unexplained_sentence, unseen, variable,
+    verdict_sentence, with_unit,
 };
+use muslip_analysis::wording::capitalised;
 use muslip_diagnose::outcome::{Diagnosis, Interval, Verdict};
 use muslip_recordings::input_error::one_line;
 
