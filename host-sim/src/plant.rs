@@ -26,6 +26,7 @@
 //! brake's. Below [`STANDSTILL_M_S`] the vehicle stands.
 
 use super::law::RigLaw;
+use muslip::sample::slip_ratio;
 
 /// Below this speed in m/s the vehicle stands still and no tyre force is left.
 pub const STANDSTILL_M_S: f64 = 0.05;
@@ -149,11 +150,8 @@ impl Plant {
     }
 
     fn contact_at(&self, [omega, v]: [f64; 2], normal_force_n: f64) -> Contact {
-        let slip_ratio = if v < STANDSTILL_M_S {
-            0.0
-        } else {
-            (v - self.parameters.radius_m * omega) / v
-        };
+        let rolling = slip_ratio(omega, v, self.parameters.radius_m);
+        let slip_ratio = rolling.filter(|_| v >= STANDSTILL_M_S).unwrap_or(0.0);
         Contact {
             slip_ratio,
             vehicle_speed_m_s: v,

@@ -1,6 +1,7 @@
 //! A recording's inputs under a repaired model: speeds, load and all other columns as recorded, the drag as the
 //! model has it.
 
+use muslip::sample::slip_ratio;
 use muslip_diagnose::campaign::Run;
 use muslip_diagnose::repaired::{Repaired, RepairedError, Which};
 use muslip_recordings::load::Loaded;
@@ -97,8 +98,10 @@ fn rows_outside(model: &Repaired, run: &Run) -> Result<usize, ReplayError> {
         .zip(&run.vehicle_speed_m_s)
         .zip(&run.normal_force_n);
     for ((omega, v), load) in rows {
-        let slip = (v - model.rig.radius_m * omega) / v;
-        if !(*v >= SLOWEST_M_S && slip.is_finite() && load.is_finite()) {
+        let Some(slip) = slip_ratio(*omega, *v, model.rig.radius_m) else {
+            continue;
+        };
+        if *v < SLOWEST_M_S || !load.is_finite() {
             continue;
         }
         rolling += 1;

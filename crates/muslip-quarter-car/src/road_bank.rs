@@ -15,6 +15,7 @@
 
 use muslip::filter::Decision;
 use muslip::real::Real;
+use muslip::sample::slip_ratio;
 
 use crate::filter::{
     Channel, ConfigError, ConfigParameter, Covariance, Estimate, Filter, Measurement, Motion,
@@ -97,8 +98,10 @@ impl<T: Real, const N: usize> RoadBank<T, N> {
                     ..
                 } = self.estimate().state;
                 let config = self.filters.first()?.config();
-                (v >= config.minimum_vehicle_speed_m_s)
-                    .then(|| (v - config.vehicle.radius_m * wheel_speed_rad_s) / v)
+                if v < config.minimum_vehicle_speed_m_s {
+                    return None;
+                }
+                slip_ratio(wheel_speed_rad_s, v, config.vehicle.radius_m)
             }
         }
     }

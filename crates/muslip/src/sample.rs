@@ -189,8 +189,9 @@ pub fn slip_friction<T: Real>(
         return Err(SampleError::LowNormalForce);
     }
 
-    let slip_ratio = (v - effective_radius_m * omega) / v;
-    finite(slip_ratio, Channel::SlipRatio)?;
+    let slip_ratio = slip_ratio(omega, v, effective_radius_m).ok_or(SampleError::NonFinite {
+        channel: Channel::SlipRatio,
+    })?;
     let friction = fx / fz;
     finite(friction, Channel::Friction)?;
     let inside = slip_ratio >= -limits.slip_margin && slip_ratio <= T::ONE + limits.slip_margin;
@@ -201,6 +202,28 @@ pub fn slip_friction<T: Real>(
         slip_ratio,
         friction,
     })
+}
+
+/// Slip s = (v - R omega)/v of a wheel with no other check: 0 rolls freely, 1 is locked.
+///
+/// `wheel_speed_rad_s` (omega), `vehicle_speed_m_s` (v) and `effective_radius_m` (R) may be anything; `None` unless
+/// v > 0 and the quotient is finite.
+///
+/// ```
+/// use muslip::sample::slip_ratio;
+///
+/// assert_eq!(slip_ratio(0.0, 20.0, 0.31), Some(1.0));
+/// assert_eq!(slip_ratio(58.0, 0.0, 0.31), None);
+/// ```
+#[inline]
+pub fn slip_ratio<T: Real>(
+    wheel_speed_rad_s: T,
+    vehicle_speed_m_s: T,
+    effective_radius_m: T,
+) -> Option<T> {
+    let slip_ratio =
+        (vehicle_speed_m_s - effective_radius_m * wheel_speed_rad_s) / vehicle_speed_m_s;
+    (vehicle_speed_m_s > T::ZERO && slip_ratio.is_finite()).then_some(slip_ratio)
 }
 
 #[inline]

@@ -1,5 +1,6 @@
 use muslip::filter::Decision;
 use muslip::real::Real;
+use muslip::sample::slip_ratio;
 
 use super::config::Config;
 use super::error::{ConfigError, Input, StepError};
@@ -96,7 +97,7 @@ impl<T: Real> Filter<T> {
         match self.motion {
             Motion::Standstill => None,
             Motion::Locked => Some(T::ONE),
-            Motion::Rolling => Some((v - self.config.vehicle.radius_m * omega) / v),
+            Motion::Rolling => slip_ratio(omega, v, self.config.vehicle.radius_m),
         }
     }
 
