@@ -3,6 +3,7 @@
 //! Released is what its `Cargo.toml` does not keep from it by `publish`.
 
 use std::fs;
+use std::path::Path;
 
 use anyhow::{Context, Result, bail, ensure};
 use serde_json::Value;
@@ -93,6 +94,11 @@ fn lacking(package: &Value, toolchain: &str) -> Vec<String> {
             "{name}: rust-version {version} is not the toolchain {toolchain} that it is tested with"
         ));
     }
+    let folder = Path::new(package["manifest_path"].as_str().unwrap_or_default()).parent();
+    let licences = ["LICENSE-APACHE", "LICENSE-MIT"]
+        .into_iter()
+        .filter(|text| folder.is_some_and(|folder| !folder.join(text).exists()));
+    lines.extend(licences.map(|text| format!("{name}: no {text}")));
     // Paths of dev-dependencies are left out of a package.
     let unversioned = package["dependencies"]
         .as_array()
@@ -150,6 +156,7 @@ mod tests {
             "keywords": [],
             "categories": ["science"],
             "rust_version": "1.9",
+            "manifest_path": "no such folder/Cargo.toml",
             "dependencies": [
                 {"name": "b", "kind": null, "req": "*"},
                 {"name": "c", "kind": "dev", "req": "*"},
@@ -163,6 +170,8 @@ mod tests {
                 "a: no readme",
                 "a: no keywords",
                 "a: rust-version 1.9 is not the toolchain 1.95.0 that it is tested with",
+                "a: no LICENSE-APACHE",
+                "a: no LICENSE-MIT",
                 "a: dependency b has no version",
             ]
         );

@@ -6,6 +6,9 @@ use std::time::Instant;
 
 use anyhow::{Context, Result, bail};
 
+/// The profile of the workspace's tests: the same for all of them, so that everything is built once.
+pub const CHECKED: &str = "checked";
+
 /// The root of the workspace.
 pub fn root() -> PathBuf {
     PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/.."))

@@ -5,16 +5,22 @@ use std::process::Command;
 
 use anyhow::{Context, Result, bail};
 
-use crate::step::{cargo, command, run, target};
+use crate::step::{CHECKED, cargo, command, run, target};
 
 /// The engine that later ones are held against, by its commit.
 const RIVAL: &str = "6b77987";
+/// The profile of what users run.
+const RELEASE: &str = "release";
 /// Continuous integration's own seed.
 const SMALL_SEED: &str = "1500";
 
 /// Builds tool and trial in release, then plays the trial with the given further arguments. `--report` is for the
 /// pages: of a commit and nothing else, with the earlier engine on the same files.
 pub fn play(arguments: &[String]) -> Result<()> {
+    play_in(RELEASE, arguments)
+}
+
+fn play_in(profile: &str, arguments: &[String]) -> Result<()> {
     let report = arguments.iter().any(|argument| argument == "--report");
     let small = arguments.iter().any(|argument| argument == "--small");
     let seeded = arguments
@@ -42,10 +48,11 @@ pub fn play(arguments: &[String]) -> Result<()> {
         further.extend(["--out".into(), "docs".into()]);
     }
     run(
-        "tool and trial, in release",
+        "tool and trial",
         cargo(&[
             "build",
-            "--release",
+            "--profile",
+            profile,
             "--locked",
             "--quiet",
             "--package",
@@ -55,21 +62,21 @@ pub fn play(arguments: &[String]) -> Result<()> {
         ]),
     )?;
     let mut trial = command(
-        &program(&target(), "sealed-trial"),
-        &["run", "--muslip", &program(&target(), "muslip")],
+        &program(&target(), profile, "sealed-trial"),
+        &["run", "--muslip", &program(&target(), profile, "muslip")],
     );
     trial.args(further);
     run("sealed trial", trial)
 }
 
-/// The small trial: continuous integration's seed, figures held by a ratchet.
+/// The small trial: continuous integration's seed, figures held by a ratchet. Of what the tests have built.
 pub fn small() -> Result<()> {
-    play(&["--small".into()])
+    play_in(CHECKED, &["--small".into()])
 }
 
-fn program(target: &std::path::Path, name: &str) -> String {
+fn program(target: &std::path::Path, profile: &str, name: &str) -> String {
     target
-        .join("release")
+        .join(profile)
         .join(format!("{name}{}", std::env::consts::EXE_SUFFIX))
         .display()
         .to_string()
@@ -103,7 +110,7 @@ fn clean_commit() -> Result<String> {
 fn rival() -> Result<PathBuf> {
     let folder = target().join("trial").join(format!("engine-{RIVAL}"));
     let built = folder.join("target");
-    let path = PathBuf::from(program(&built, "muslip"));
+    let path = PathBuf::from(program(&built, RELEASE, "muslip"));
     if path.exists() {
         return Ok(path);
     }
