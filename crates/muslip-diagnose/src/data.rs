@@ -47,7 +47,7 @@ impl Catalogue {
     /// Mechanisms that are the lateness of a speed.
     #[must_use]
     pub fn delays(&self) -> Vec<Id> {
-        let late = self.plain.iter().filter(|m| m.late().is_some());
+        let late = self.plain.iter().filter(|m| m.facts().late.is_some());
         late.map(|m| m.id()).collect()
     }
     /// One entry in plain numbers.

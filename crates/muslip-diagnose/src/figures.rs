@@ -3,7 +3,7 @@
 use nalgebra::DMatrix;
 
 use crate::data::{Data, Listed, WIDTH};
-use crate::mechanism::{Law, Reported};
+use crate::mechanism::{Fitted, Law, Reported};
 use crate::model::Model;
 use crate::number::{Dual, Number};
 
@@ -29,13 +29,12 @@ fn figures_in<T: Listed>(data: &Data, model: &Model, p: &[T], place: usize) -> V
         at += term.parameters.len();
     }
     let own = &p[at..at + model.terms[place].parameters.len()];
-    let law = Law::rudd(p[0].exp(), p[1].exp());
-    T::entry(&data.catalogue, model.terms[place].entry).report(
-        own,
-        &law,
-        &data.context,
-        &data.series,
-    )
+    let fitted = Fitted {
+        law: &Law::rudd(p[0].exp(), p[1].exp()),
+        context: &data.context,
+        series: &data.series,
+    };
+    T::entry(&data.catalogue, model.terms[place].entry).report(own, &fitted)
 }
 
 /// A mechanism's figures by the contract with standard deviations: by the parameters' covariance (delta

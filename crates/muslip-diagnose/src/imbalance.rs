@@ -79,7 +79,7 @@ impl Repaired {
             }
         };
         let (left, lacking) = (of(&with), of(&without));
-        let against = mechanism.drawn_over();
+        let against = mechanism.facts().drawn_over;
         let at = channel(against, series);
         let stretches = usable
             .iter()

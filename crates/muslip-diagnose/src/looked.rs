@@ -33,7 +33,7 @@ pub fn seen(data: &Data, table: &Table, scores: &[Score], threshold: f64) -> Vec
             let candidate = &table.candidates[score.candidate];
             let (id, entry) = (candidate.id?, candidate.entry?);
             let mechanism = data.catalogue.get(entry);
-            let Some(amplitude) = mechanism.amplitude() else {
+            let Some(amplitude) = mechanism.facts().amplitude else {
                 let size = score.sizes.iter().copied().fold(0.0, f64::max);
                 return Some(Seen {
                     id,

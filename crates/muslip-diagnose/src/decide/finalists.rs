@@ -56,7 +56,7 @@ fn start_of(data: &Data, candidate: &Candidate, score: &Score) -> Vec<f64> {
     let bounds = data.catalogue.get(entry).parameters(&data.context);
     if candidate.free.is_empty() {
         // What is no effect's size cannot be scaled.
-        if p.len() == 1 && data.catalogue.get(entry).amplitude() == Some(0) {
+        if p.len() == 1 && data.catalogue.get(entry).facts().amplitude == Some(0) {
             p[0] *= score.coefficients[0].clamp(0.3, 3.0);
         }
     } else {
@@ -72,7 +72,7 @@ fn start_of(data: &Data, candidate: &Candidate, score: &Score) -> Vec<f64> {
 
 /// Gain of a candidate as it starts: of its best size, where it has one, else of the whole effect, no more and no less.
 fn gain_at_start(data: &Data, candidate: &Candidate, score: &Score) -> f64 {
-    let sized = |entry: usize| data.catalogue.get(entry).amplitude().is_some();
+    let sized = |entry: usize| data.catalogue.get(entry).facts().amplitude.is_some();
     if candidate.free.is_empty() && candidate.entry.is_some_and(|entry| !sized(entry)) {
         let c = score.coefficients[0];
         if c > 0.0 {

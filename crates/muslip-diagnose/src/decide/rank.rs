@@ -12,7 +12,7 @@ pub fn rank(data: &Data, trials: &mut [Trial]) {
     better_predicted_first(trials, Trial::weight, |t| t.remembers.then_some(t.predicts));
     commoner_first(trials, Trial::weight, |t| {
         let mechanism = t.mechanism();
-        mechanism.is_some_and(|(_, entry)| data.catalogue.get(entry).rare())
+        mechanism.is_some_and(|(_, entry)| data.catalogue.get(entry).facts().rare)
     });
 }
 

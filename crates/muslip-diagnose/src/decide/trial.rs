@@ -52,7 +52,7 @@ impl Claim {
     /// Whether it works through the force that is predicted.
     fn works_through_force(&self, data: &Data) -> bool {
         match self {
-            Self::Mechanism(_, entry) => data.catalogue.get(*entry).through_force(),
+            Self::Mechanism(_, entry) => data.catalogue.get(*entry).facts().through_force,
             Self::Dependence(own) => own.balance == Balance::Tyre,
         }
     }
@@ -192,7 +192,8 @@ impl<'a> Before<'a> {
         let balance = claim.balance(data);
         let named = base.model.terms.iter().any(|t| {
             let term = data.catalogue.get(t.entry);
-            term.id().balance() == balance && (balance != Balance::Tyre || term.through_force())
+            term.id().balance() == balance
+                && (balance != Balance::Tyre || term.facts().through_force)
         });
         let in_force = claim.works_through_force(data);
         let predicts = if in_force {

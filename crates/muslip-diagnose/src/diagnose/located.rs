@@ -5,7 +5,7 @@ use crate::correction::Levers;
 use crate::innovations::rows::rows_of;
 use crate::law::closest;
 use crate::locate::{intervals, regions};
-use crate::mechanism::{Balance, Describe, Id};
+use crate::mechanism::{Balance, Id};
 use crate::model::Model;
 use crate::outcome::{Interval, Region};
 use crate::series::Series;
@@ -68,8 +68,8 @@ impl Answer<'_> {
         let mechanisms = terms.map(|t| catalogue.get(t.entry));
         let mut own = mechanisms.filter(|m| m.id().balance() == balance);
         let usual = balance.channel();
-        let first = own.next().map_or(usual, Describe::channel);
-        if own.all(|m| m.channel() == first) {
+        let first = own.next().map_or(usual, |m| m.facts().channel);
+        if own.all(|m| m.facts().channel == first) {
             first
         } else {
             usual

@@ -16,7 +16,7 @@ use crate::campaign::{Rig, Run};
 use crate::constants::LEAST_OF_TYRE;
 use crate::data::Data;
 use crate::looked::looked_for;
-use crate::mechanism::{Balance, Describe, Id};
+use crate::mechanism::{Balance, Id};
 use crate::model::Model;
 use crate::number::finite_or_zero;
 use crate::outcome::{Diagnosis, Fault, Fit, Recording, Role, ValueAndStd, Verdict};
@@ -208,7 +208,7 @@ impl Answer<'_> {
             for named in &mut mechanisms {
                 if Id::parse(named.id)
                     .and_then(|id| self.data.catalogue.of(id))
-                    .is_some_and(Describe::through_force)
+                    .is_some_and(|m| m.facts().through_force)
                 {
                     named.evidence.confidence = named.evidence.confidence.min(0.5);
                 }

@@ -134,7 +134,7 @@ impl Answer<'_> {
 
     /// The same, and what the audit says of it.
     fn delays_of(&self, id: Id) -> Option<[Timing; 2]> {
-        let (fitted, audited) = match self.data.catalogue.of(id)?.late()? {
+        let (fitted, audited) = match self.data.catalogue.of(id)?.facts().late? {
             Speed::Wheel => (self.timing.wheel, self.audit.wheel_late),
             Speed::Vehicle => (self.timing.vehicle, self.audit.vehicle_late),
         };
@@ -144,11 +144,7 @@ impl Answer<'_> {
     /// A delay as a mechanism, in that mechanism's own words.
     fn delay(&self, id: Id, value: f64, std: f64) -> Option<NamedMechanism> {
         let mechanism = self.data.catalogue.of(id)?;
-        let reported = Reported {
-            name: "delay",
-            unit: "s",
-            value,
-        };
+        let reported = Reported::new("delay", "s", value);
         let z = value.abs() / std.max(1e-5);
         Some(NamedMechanism {
             id: id.as_str(),

@@ -8,7 +8,7 @@ use super::noise::Slopes;
 use super::rows::{Rows, Triple, quiet_force, rows, rows_of};
 use crate::correction::Levers;
 use crate::data::{Data, WIDTH};
-use crate::mechanism::{Balance, Id, Residuals};
+use crate::mechanism::{Balance, Id, Residuals, Search};
 use crate::model::{Model, Term};
 use crate::number::{Dual, Number, finite_or_zero};
 use crate::prepare::mean_twice_about;
@@ -360,17 +360,18 @@ pub fn table(
             }
         }
     }
+    let search = Search {
+        context: &data.context,
+        series: &data.series,
+        residuals: evidence,
+    };
     let entries: Vec<(usize, Vec<f64>)> = data
         .catalogue
         .entries()
         .iter()
         .enumerate()
         .filter(|(entry, m)| wanted(m.id()) && !model.terms.iter().any(|t| t.entry == *entry))
-        .flat_map(|(entry, m)| {
-            m.starts(&data.context, &data.series, evidence)
-                .into_iter()
-                .map(move |s| (entry, s))
-        })
+        .flat_map(|(entry, m)| m.starts(&search).into_iter().map(move |s| (entry, s)))
         .collect();
     let made: Vec<Option<Own>> = entries
         .par_iter()

@@ -1,41 +1,25 @@
 //! A deceleration that grows with speed squared and is not tyre drag.
 
-use super::guide::runs;
-use super::{
-    Against, Alias, Balance, Compensation, Context, Describe, Example, Guide, Id, Kind, Law,
-    Mechanism, Memory, Parameter, Reported, Residuals, Sign, Stage, State,
-};
-use crate::number::Number;
-use crate::series::Series;
+use super::prelude::*;
 
 /// A deceleration that grows with speed squared and is not tyre drag.
 pub struct AeroDrag;
 
 impl Describe for AeroDrag {
-    fn id(&self) -> Id {
-        Id::AeroDrag
-    }
-    fn stage(&self) -> Stage {
-        Stage::Vehicle
-    }
-    fn drawn_over(&self) -> Against {
-        Against::VehicleSpeed
+    fn facts(&self) -> Facts {
+        Facts {
+            drawn_over: Against::VehicleSpeed,
+            ..Facts::of(
+                Id::AeroDrag,
+                Stage::Vehicle,
+                "m dv/dt = -drag - coefficient * v^2",
+            )
+        }
     }
     fn parameters(&self, context: &Context) -> Vec<Parameter> {
         // Up to one g at the campaign's largest speed.
         let most = 9.81 * context.mass / context.max_speed.max(0.5).powi(2);
         vec![Parameter::new("coefficient", "kg/m", 0.0, most)]
-    }
-    fn starts(
-        &self,
-        _context: &Context,
-        _series: &[Series],
-        _evidence: &[Residuals],
-    ) -> Vec<Vec<f64>> {
-        vec![vec![0.0]]
-    }
-    fn equation(&self) -> &'static str {
-        "m dv/dt = -drag - coefficient * v^2"
     }
     fn statement(&self, reported: &[Reported<f64>], _p: &[f64]) -> String {
         format!(
@@ -69,12 +53,9 @@ impl Describe for AeroDrag {
             ],
             smallest: "three percent of the largest drag at the largest speed",
             smallest_size: |c| 0.03 * c.max_drag.max(c.drag_sigma) / c.max_speed.max(0.1).powi(2),
-            compensation: Compensation::Not("not of the tyre balance: it does not touch the curve"),
+            compensation: Compensation::NOT_OF_THE_TYRE,
             carried: "as it is, from the fresh run's own speed",
-            example: Example {
-                form: "",
-                parameters: &[0.8],
-            },
+            example: Example::of("", &[0.8]),
         }
     }
 }
@@ -85,17 +66,7 @@ impl<T: Number> Mechanism<T> for AeroDrag {
             *f += p[0] * (v * v.abs());
         }
     }
-    fn report(
-        &self,
-        p: &[T],
-        _law: &Law<T>,
-        _context: &Context,
-        _series: &[Series],
-    ) -> Vec<Reported<T>> {
-        vec![Reported {
-            name: "coefficient",
-            unit: "kg/m",
-            value: p[0],
-        }]
+    fn report(&self, p: &[T], _fitted: &Fitted<'_, T>) -> Vec<Reported<T>> {
+        vec![Reported::new("coefficient", "kg/m", p[0])]
     }
 }

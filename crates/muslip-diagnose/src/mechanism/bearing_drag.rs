@@ -1,12 +1,6 @@
 //! A torque that opposes rotation, beside brake and tyre.
 
-use super::guide::runs;
-use super::{
-    Against, Alias, Balance, Compensation, Context, Describe, Example, Guide, Id, Kind, Law,
-    Mechanism, Memory, Parameter, Reported, Residuals, Sign, Stage, State,
-};
-use crate::number::Number;
-use crate::series::Series;
+use super::prelude::*;
 
 /// What the torque depends on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -29,24 +23,28 @@ pub struct BearingDrag {
 }
 
 impl Describe for BearingDrag {
-    fn id(&self) -> Id {
-        Id::BearingDrag
-    }
-    fn form(&self) -> &'static str {
-        match self.form {
-            Form::Constant => "constant",
-            Form::Speed => "with_speed",
-            Form::Load => "with_load",
-        }
-    }
-    fn stage(&self) -> Stage {
-        Stage::Wheel
-    }
-    fn drawn_over(&self) -> Against {
-        if self.form() == "with_load" {
-            Against::NormalForce
-        } else {
-            Against::WheelSpeed
+    fn facts(&self) -> Facts {
+        let (form, drawn_over, equation) = match self.form {
+            Form::Constant => (
+                "constant",
+                Against::WheelSpeed,
+                "J d(omega)/dt = R drag - brake_torque - torque",
+            ),
+            Form::Speed => (
+                "with_speed",
+                Against::WheelSpeed,
+                "J d(omega)/dt = R drag - brake_torque - torque - a (omega/mean - 1)",
+            ),
+            Form::Load => (
+                "with_load",
+                Against::NormalForce,
+                "J d(omega)/dt = R drag - brake_torque - torque - a (normal_force/mean - 1)",
+            ),
+        };
+        Facts {
+            form,
+            drawn_over,
+            ..Facts::of(Id::BearingDrag, Stage::Wheel, equation)
         }
     }
     fn parameters(&self, context: &Context) -> Vec<Parameter> {
@@ -69,23 +67,6 @@ impl Describe for BearingDrag {
         }
         all
     }
-    fn starts(
-        &self,
-        _context: &Context,
-        _series: &[Series],
-        _evidence: &[Residuals],
-    ) -> Vec<Vec<f64>> {
-        vec![vec![0.0; if self.form == Form::Constant { 1 } else { 2 }]]
-    }
-    fn equation(&self) -> &'static str {
-        match self.form {
-            Form::Constant => "J d(omega)/dt = R drag - brake_torque - torque",
-            Form::Speed => "J d(omega)/dt = R drag - brake_torque - torque - a (omega/mean - 1)",
-            Form::Load => {
-                "J d(omega)/dt = R drag - brake_torque - torque - a (normal_force/mean - 1)"
-            }
-        }
-    }
     fn statement(&self, reported: &[Reported<f64>], _p: &[f64]) -> String {
         format!(
             "a torque of {:.2} N m opposes the wheel's rotation beside brake and tyre",
@@ -106,12 +87,9 @@ impl Describe for BearingDrag {
             }],
             smallest: "three percent of the largest drag at the radius",
             smallest_size: |c| 0.03 * c.max_drag.max(c.drag_sigma) * c.radius,
-            compensation: Compensation::Not("not of the tyre balance: it does not touch the curve"),
+            compensation: Compensation::NOT_OF_THE_TYRE,
             carried: "as it is, from the fresh run's own speed and load",
-            example: Example {
-                form: "constant",
-                parameters: &[40.0],
-            },
+            example: Example::of("constant", &[40.0]),
         }
     }
 }
@@ -134,17 +112,7 @@ impl<T: Number> Mechanism<T> for BearingDrag {
             state.opposing[k] += torque;
         }
     }
-    fn report(
-        &self,
-        p: &[T],
-        _law: &Law<T>,
-        _context: &Context,
-        _series: &[Series],
-    ) -> Vec<Reported<T>> {
-        vec![Reported {
-            name: "torque",
-            unit: "N m",
-            value: p[0],
-        }]
+    fn report(&self, p: &[T], _fitted: &Fitted<'_, T>) -> Vec<Reported<T>> {
+        vec![Reported::new("torque", "N m", p[0])]
     }
 }

@@ -1,12 +1,6 @@
 //! Torque per pressure falls with brake temperature.
 
-use super::guide::runs;
-use super::{
-    Alias, Balance, Compensation, Context, Describe, Example, Guide, Id, Kind, Law, Mechanism,
-    Memory, Parameter, Reported, Residuals, Sign, Stage, State,
-};
-use crate::number::Number;
-use crate::series::Series;
+use super::prelude::*;
 
 /// Brake temperature in units of the mean brake power times a second, from cold at the start of a run.
 fn heat<T: Number>(time_constant: T, series: &Series, context: &Context) -> Vec<T> {
@@ -33,11 +27,12 @@ fn heat<T: Number>(time_constant: T, series: &Series, context: &Context) -> Vec<
 pub struct BrakeFade;
 
 impl Describe for BrakeFade {
-    fn id(&self) -> Id {
-        Id::BrakeFade
-    }
-    fn stage(&self) -> Stage {
-        Stage::Wheel
+    fn facts(&self) -> Facts {
+        Facts::of(
+            Id::BrakeFade,
+            Stage::Wheel,
+            "T = torque_per_pressure * pressure * exp(-sensitivity * theta), d(theta)/dt = power/mean_power - theta/time_constant",
+        )
     }
     fn parameters(&self, context: &Context) -> Vec<Parameter> {
         vec![
@@ -50,20 +45,12 @@ impl Describe for BrakeFade {
             ),
         ]
     }
-    fn starts(
-        &self,
-        context: &Context,
-        _series: &[Series],
-        _evidence: &[Residuals],
-    ) -> Vec<Vec<f64>> {
+    fn starts(&self, search: &Search<'_>) -> Vec<Vec<f64>> {
         [0.5, 2.0, 8.0, 40.0]
             .iter()
-            .filter(|t| **t < 20.0 * context.duration)
+            .filter(|t| **t < 20.0 * search.context.duration)
             .map(|t| vec![0.0, *t])
             .collect()
-    }
-    fn equation(&self) -> &'static str {
-        "T = torque_per_pressure * pressure * exp(-sensitivity * theta), d(theta)/dt = power/mean_power - theta/time_constant"
     }
     fn statement(&self, reported: &[Reported<f64>], _p: &[f64]) -> String {
         format!(
@@ -102,12 +89,9 @@ impl Describe for BrakeFade {
             ],
             smallest: "five percent of the torque",
             smallest_size: |_| 0.05,
-            compensation: Compensation::Not("not of the tyre balance: it does not touch the curve"),
+            compensation: Compensation::NOT_OF_THE_TYRE,
             carried: "starts cold in every run; heated by the fresh run's own brake power",
-            example: Example {
-                form: "",
-                parameters: &[0.1, 3.0],
-            },
+            example: Example::of("", &[0.1, 3.0]),
         }
     }
 }
@@ -118,16 +102,10 @@ impl<T: Number> Mechanism<T> for BrakeFade {
             *torque = *torque * (-(p[0] * theta)).exp();
         }
     }
-    fn report(
-        &self,
-        p: &[T],
-        _law: &Law<T>,
-        context: &Context,
-        series: &[Series],
-    ) -> Vec<Reported<T>> {
+    fn report(&self, p: &[T], fitted: &Fitted<'_, T>) -> Vec<Reported<T>> {
         let mut largest = T::constant(0.0);
-        for run in series {
-            for theta in heat(p[1], run, context) {
+        for run in fitted.series {
+            for theta in heat(p[1], run, fitted.context) {
                 if theta.value() > largest.value() {
                     largest = theta;
                 }
@@ -135,16 +113,8 @@ impl<T: Number> Mechanism<T> for BrakeFade {
         }
         let loss = -((-(p[0] * largest)).exp()) + 1.0;
         vec![
-            Reported {
-                name: "torque_loss",
-                unit: "1",
-                value: loss,
-            },
-            Reported {
-                name: "time_constant",
-                unit: "s",
-                value: p[1],
-            },
+            Reported::new("torque_loss", "1", loss),
+            Reported::new("time_constant", "s", p[1]),
         ]
     }
 }

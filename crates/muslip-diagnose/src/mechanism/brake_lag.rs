@@ -1,49 +1,29 @@
 //! Brake torque follows pressure with a lag.
 
 use super::filters::first_order;
-use super::guide::runs;
-use super::{
-    Alias, Balance, Compensation, Context, Describe, Example, Guide, Id, Kind, Law, Mechanism,
-    Memory, Parameter, Reported, Residuals, Sign, Stage, State,
-};
-use crate::number::Number;
-use crate::series::Series;
+use super::late;
+use super::prelude::*;
 
 /// Brake torque follows pressure with a lag.
 pub struct BrakeLag;
 
 impl Describe for BrakeLag {
-    fn id(&self) -> Id {
-        Id::BrakeLag
-    }
-    fn stage(&self) -> Stage {
-        Stage::Wheel
+    fn facts(&self) -> Facts {
+        Facts::of(
+            Id::BrakeLag,
+            Stage::Wheel,
+            "time_constant * dT/dt + T = torque_per_pressure * pressure",
+        )
     }
     fn memory_s(&self, p: &[f64], _context: &Context) -> Option<f64> {
         p.first().copied()
     }
     fn parameters(&self, context: &Context) -> Vec<Parameter> {
-        vec![Parameter::new(
-            "time_constant",
-            "s",
-            1e-5,
-            1.0_f64.min(0.25 * context.duration),
-        )]
+        let most = late::longest(1.0, context);
+        vec![Parameter::new("time_constant", "s", 1e-5, most)]
     }
-    fn starts(
-        &self,
-        context: &Context,
-        _series: &[Series],
-        _evidence: &[Residuals],
-    ) -> Vec<Vec<f64>> {
-        [2.0, 6.0, 20.0, 60.0, 200.0]
-            .iter()
-            .map(|m| vec![m * 1e-3])
-            .filter(|s| s[0] > 0.2 * context.dt)
-            .collect()
-    }
-    fn equation(&self) -> &'static str {
-        "time_constant * dT/dt + T = torque_per_pressure * pressure"
+    fn starts(&self, search: &Search<'_>) -> Vec<Vec<f64>> {
+        late::starts(&[2.0, 6.0, 20.0, 60.0, 200.0], search.context)
     }
     fn statement(&self, reported: &[Reported<f64>], _p: &[f64]) -> String {
         format!(
@@ -72,12 +52,9 @@ impl Describe for BrakeLag {
             ],
             smallest: "five milliseconds; one to two are within the bias of ideal sensors",
             smallest_size: |_| 0.005,
-            compensation: Compensation::Not("not of the tyre balance: it does not touch the curve"),
+            compensation: Compensation::NOT_OF_THE_TYRE,
             carried: "as it is: settled at the run's first sample",
-            example: Example {
-                form: "",
-                parameters: &[0.03],
-            },
+            example: Example::of("", &[0.03]),
         }
     }
 }
@@ -87,17 +64,7 @@ impl<T: Number> Mechanism<T> for BrakeLag {
         let rate = T::constant(1.0) / p[0];
         first_order(&mut state.brake, |k| rate * series.dt[k]);
     }
-    fn report(
-        &self,
-        p: &[T],
-        _law: &Law<T>,
-        _context: &Context,
-        _series: &[Series],
-    ) -> Vec<Reported<T>> {
-        vec![Reported {
-            name: "time_constant",
-            unit: "s",
-            value: p[0],
-        }]
+    fn report(&self, p: &[T], _fitted: &Fitted<'_, T>) -> Vec<Reported<T>> {
+        vec![Reported::new("time_constant", "s", p[0])]
     }
 }

@@ -1,11 +1,6 @@
 //! The sharpness of the peak or the friction of the full skid is not that of the two-parameter law.
 
-use super::{
-    Alias, Balance, Compensation, Context, Describe, Example, Guide, Id, Kind, Law, Mechanism,
-    Memory, Parameter, Reported, Residuals, Sign, Stage, State,
-};
-use crate::number::Number;
-use crate::series::Series;
+use super::prelude::*;
 
 /// Forms of the curve.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -26,17 +21,19 @@ pub struct CurveShape {
 }
 
 impl Describe for CurveShape {
-    fn id(&self) -> Id {
-        Id::CurveShape
-    }
-    fn form(&self) -> &'static str {
-        match self.form {
+    fn facts(&self) -> Facts {
+        let form = match self.form {
             Form::TwoSided => "two_sided",
             Form::Stretched => "stretched",
+        };
+        Facts {
+            form,
+            ..Facts::of(
+                Id::CurveShape,
+                Stage::Law,
+                "mu = peak (2 + b) x / (1 + b x + x^2), x = (slip/critical_slip)^p, b and p of their own on the falling side",
+            )
         }
-    }
-    fn stage(&self) -> Stage {
-        Stage::Law
     }
     fn parameters(&self, _context: &Context) -> Vec<Parameter> {
         let mut all = vec![
@@ -48,12 +45,7 @@ impl Describe for CurveShape {
         }
         all
     }
-    fn starts(
-        &self,
-        _context: &Context,
-        _series: &[Series],
-        _evidence: &[Residuals],
-    ) -> Vec<Vec<f64>> {
+    fn starts(&self, _search: &Search<'_>) -> Vec<Vec<f64>> {
         let mut starts = vec![vec![0.0, 0.0], vec![0.3, 1.0], vec![0.0, 2.0]];
         if self.form == Form::Stretched {
             for s in &mut starts {
@@ -61,9 +53,6 @@ impl Describe for CurveShape {
             }
         }
         starts
-    }
-    fn equation(&self) -> &'static str {
-        "mu = peak (2 + b) x / (1 + b x + x^2), x = (slip/critical_slip)^p, b and p of their own on the falling side"
     }
     fn statement(&self, reported: &[Reported<f64>], _p: &[f64]) -> String {
         format!(
@@ -87,10 +76,7 @@ impl Describe for CurveShape {
             smallest_size: |_| 0.1,
             compensation: Compensation::Not("another law than the filter's two-parameter one"),
             carried: "as it is: the shape is the tyre's, whatever the run",
-            example: Example {
-                form: "two_sided",
-                parameters: &[0.0, 1.2],
-            },
+            example: Example::of("two_sided", &[0.0, 1.2]),
         }
     }
 }
@@ -100,21 +86,11 @@ impl<T: Number> Mechanism<T> for CurveShape {
         state.law.rise = Some(p[0]);
         state.law.fall = Some((p[1], p.get(2).copied()));
     }
-    fn report(
-        &self,
-        p: &[T],
-        law: &Law<T>,
-        _context: &Context,
-        _series: &[Series],
-    ) -> Vec<Reported<T>> {
-        let mut shaped = *law;
+    fn report(&self, p: &[T], fitted: &Fitted<'_, T>) -> Vec<Reported<T>> {
+        let mut shaped = *fitted.law;
         shaped.rise = Some(p[0]);
         shaped.fall = Some((p[1], p.get(2).copied()));
-        let full = shaped.shape(T::constant(1.0) / law.critical);
-        vec![Reported {
-            name: "full_skid_ratio",
-            unit: "1",
-            value: full,
-        }]
+        let full = shaped.shape(T::constant(1.0) / fitted.law.critical);
+        vec![Reported::new("full_skid_ratio", "1", full)]
     }
 }

@@ -1,11 +1,6 @@
 //! The rolling radius is not the rig file's (constant, or changing with load or speed), so slip is biased.
 
-use super::{
-    Balance, Compensation, Context, Describe, Example, Guide, Id, Kind, Law, Mechanism, Memory,
-    Parameter, Reported, Residuals, Sign, Stage, State,
-};
-use crate::number::Number;
-use crate::series::Series;
+use super::prelude::*;
 
 /// What the radius depends on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -28,21 +23,23 @@ pub struct EffectiveRadius {
 }
 
 impl Describe for EffectiveRadius {
-    fn id(&self) -> Id {
-        Id::EffectiveRadius
-    }
-    fn form(&self) -> &'static str {
-        match self.form {
-            Form::Constant => "constant",
-            Form::Load => "with_load",
-            Form::Speed => "with_speed",
+    fn facts(&self) -> Facts {
+        let (form, equation) = match self.form {
+            Form::Constant => ("constant", "slip = (v - radius * omega)/v"),
+            Form::Load => (
+                "with_load",
+                "slip = (v - radius * (1 + a (normal_force/mean - 1)) * omega)/v",
+            ),
+            Form::Speed => (
+                "with_speed",
+                "slip = (v - radius * (1 + a ((v/mean v)^2 - 1)) * omega)/v",
+            ),
+        };
+        Facts {
+            form,
+            through_force: false,
+            ..Facts::of(Id::EffectiveRadius, Stage::Kinematics, equation)
         }
-    }
-    fn stage(&self) -> Stage {
-        Stage::Kinematics
-    }
-    fn through_force(&self) -> bool {
-        false
     }
     fn parameters(&self, _context: &Context) -> Vec<Parameter> {
         let mut all = vec![Parameter::new("radius_error", "1", -0.1, 0.1)];
@@ -52,21 +49,6 @@ impl Describe for EffectiveRadius {
             Form::Speed => all.push(Parameter::new("per_relative_speed_squared", "1", -0.1, 0.1)),
         }
         all
-    }
-    fn starts(
-        &self,
-        _context: &Context,
-        _series: &[Series],
-        _evidence: &[Residuals],
-    ) -> Vec<Vec<f64>> {
-        vec![vec![0.0; if self.form == Form::Constant { 1 } else { 2 }]]
-    }
-    fn equation(&self) -> &'static str {
-        match self.form {
-            Form::Constant => "slip = (v - radius * omega)/v",
-            Form::Load => "slip = (v - radius * (1 + a (normal_force/mean - 1)) * omega)/v",
-            Form::Speed => "slip = (v - radius * (1 + a ((v/mean v)^2 - 1)) * omega)/v",
-        }
     }
     fn statement(&self, reported: &[Reported<f64>], p: &[f64]) -> String {
         format!(
@@ -96,10 +78,7 @@ impl Describe for EffectiveRadius {
                 "forms slip with the radius found, which may depend on the sample's load or speed",
             ),
             carried: "as it is, from the fresh run's own load and speed",
-            example: Example {
-                form: "constant",
-                parameters: &[0.01],
-            },
+            example: Example::of("constant", &[0.01]),
         }
     }
 }
@@ -122,17 +101,11 @@ impl<T: Number> Mechanism<T> for EffectiveRadius {
         }
         state.radius = Some(radius);
     }
-    fn report(
-        &self,
-        p: &[T],
-        _law: &Law<T>,
-        context: &Context,
-        _series: &[Series],
-    ) -> Vec<Reported<T>> {
-        vec![Reported {
-            name: "radius",
-            unit: "m",
-            value: (p[0] + 1.0) * context.radius,
-        }]
+    fn report(&self, p: &[T], fitted: &Fitted<'_, T>) -> Vec<Reported<T>> {
+        vec![Reported::new(
+            "radius",
+            "m",
+            (p[0] + 1.0) * fitted.context.radius,
+        )]
     }
 }

@@ -1,12 +1,7 @@
 //! The wheel speed reading varies once (or a few times) a revolution.
 
 use super::once_a_turn::Form;
-use super::{
-    Balance, Compensation, Context, Describe, Example, Guide, Id, Kind, Law, Mechanism, Memory,
-    Parameter, Reported, Residuals, Sign, Stage, State,
-};
-use crate::number::Number;
-use crate::series::Series;
+use super::prelude::*;
 
 /// Largest amplitude of an order, as a share of the wheel speed.
 const LIMIT: f64 = 0.08;
@@ -18,43 +13,29 @@ pub struct EncoderRipple {
 }
 
 impl Describe for EncoderRipple {
-    fn id(&self) -> Id {
-        Id::EncoderRipple
-    }
-    fn form(&self) -> &'static str {
-        self.form.as_str()
-    }
-    fn stage(&self) -> Stage {
-        Stage::Kinematics
-    }
-    fn through_force(&self) -> bool {
-        false
-    }
-    fn channel(&self) -> &'static str {
-        "wheel_speed_rad_s"
+    fn facts(&self) -> Facts {
+        Facts {
+            form: self.form.as_str(),
+            through_force: false,
+            channel: "wheel_speed_rad_s",
+            ..Facts::of(
+                Id::EncoderRipple,
+                Stage::Kinematics,
+                "measured omega = omega (1 + sum a_k cos(k angle) + b_k sin(k angle))",
+            )
+        }
     }
     fn parameters(&self, context: &Context) -> Vec<Parameter> {
         self.form.parameters(context, LIMIT)
     }
-    fn starts(
-        &self,
-        context: &Context,
-        _series: &[Series],
-        _evidence: &[Residuals],
-    ) -> Vec<Vec<f64>> {
-        self.form.starts(context)
-    }
-    fn equation(&self) -> &'static str {
-        "measured omega = omega (1 + sum a_k cos(k angle) + b_k sin(k angle))"
+    fn starts(&self, search: &Search<'_>) -> Vec<Vec<f64>> {
+        self.form.starts(search.context)
     }
     fn statement(&self, reported: &[Reported<f64>], _p: &[f64]) -> String {
         format!(
             "the wheel speed reading varies once a revolution by {:.3} % of itself",
             100.0 * reported[0].value
         )
-    }
-    fn predicts(&self) -> bool {
-        !self.form.phase_per_run
     }
     fn guide(&self) -> Guide {
         Guide {
@@ -68,10 +49,7 @@ impl Describe for EncoderRipple {
             smallest_size: |_| 0.003,
             compensation: Compensation::Not("needs the wheel's angle, which a sample lacks"),
             carried: "its size as it is; its phase only where the wheel's angle is known from run to run",
-            example: Example {
-                form: "first_order",
-                parameters: &[0.01, 0.0],
-            },
+            example: Example::of("first_order", &[0.01, 0.0]),
         }
     }
 }
@@ -97,13 +75,7 @@ impl<T: Number> Mechanism<T> for EncoderRipple {
             state.read_off = Some(off);
         }
     }
-    fn report(
-        &self,
-        p: &[T],
-        _law: &Law<T>,
-        _context: &Context,
-        _series: &[Series],
-    ) -> Vec<Reported<T>> {
+    fn report(&self, p: &[T], _fitted: &Fitted<'_, T>) -> Vec<Reported<T>> {
         self.form.report(p, 1.0)
     }
 }

@@ -1,48 +1,24 @@
 //! The drag channel reports late by a fixed time.
 
-use super::guide::runs;
-use super::{
-    Alias, Balance, Compensation, Context, Describe, Example, Guide, Id, Kind, Law, Mechanism,
-    Memory, Parameter, Reported, Residuals, Sign, Stage, State,
-};
-use crate::number::Number;
-use crate::series::Series;
+use super::late;
+use super::prelude::*;
 
 /// The drag channel reports late by a fixed time.
 pub struct ForceDelay;
 
 impl Describe for ForceDelay {
-    fn id(&self) -> Id {
-        Id::ForceDelay
-    }
-    fn stage(&self) -> Stage {
-        Stage::Line
+    fn facts(&self) -> Facts {
+        Facts::of(Id::ForceDelay, Stage::Line, "reading(t) = drag(t - delay)")
     }
     fn memory_s(&self, p: &[f64], _context: &Context) -> Option<f64> {
         p.first().copied()
     }
     fn parameters(&self, context: &Context) -> Vec<Parameter> {
-        vec![Parameter::new(
-            "delay",
-            "s",
-            0.0,
-            0.15_f64.min(0.25 * context.duration),
-        )]
+        let most = late::longest(0.15, context);
+        vec![Parameter::new("delay", "s", 0.0, most)]
     }
-    fn starts(
-        &self,
-        context: &Context,
-        _series: &[Series],
-        _evidence: &[Residuals],
-    ) -> Vec<Vec<f64>> {
-        [0.5, 1.5, 4.0, 10.0, 25.0, 60.0]
-            .iter()
-            .map(|m| vec![m * 1e-3])
-            .filter(|s| s[0] > 0.2 * context.dt)
-            .collect()
-    }
-    fn equation(&self) -> &'static str {
-        "reading(t) = drag(t - delay)"
+    fn starts(&self, search: &Search<'_>) -> Vec<Vec<f64>> {
+        late::starts(&[0.5, 1.5, 4.0, 10.0, 25.0, 60.0], search.context)
     }
     fn statement(&self, reported: &[Reported<f64>], _p: &[f64]) -> String {
         format!(
@@ -90,10 +66,7 @@ impl Describe for ForceDelay {
                 "delays the slip and the load by the same time in a delay line, so that they meet the force that belongs to them",
             ),
             carried: "as it is",
-            example: Example {
-                form: "",
-                parameters: &[0.02],
-            },
+            example: Example::of("", &[0.02]),
         }
     }
 }
@@ -132,17 +105,7 @@ impl<T: Number> Mechanism<T> for ForceDelay {
             state.force[k] = y;
         }
     }
-    fn report(
-        &self,
-        p: &[T],
-        _law: &Law<T>,
-        _context: &Context,
-        _series: &[Series],
-    ) -> Vec<Reported<T>> {
-        vec![Reported {
-            name: "delay",
-            unit: "s",
-            value: p[0],
-        }]
+    fn report(&self, p: &[T], _fitted: &Fitted<'_, T>) -> Vec<Reported<T>> {
+        vec![Reported::new("delay", "s", p[0])]
     }
 }

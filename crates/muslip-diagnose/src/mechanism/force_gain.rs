@@ -1,42 +1,20 @@
 //! The drag channel's scale is wrong.
 
-use super::guide::runs;
-use super::{
-    Against, Alias, Balance, Compensation, Context, Describe, Example, Guide, Id, Kind, Law,
-    Mechanism, Memory, Parameter, Reported, Residuals, Sign, Stage, State,
-};
-use crate::number::Number;
-use crate::series::Series;
+use super::prelude::*;
 
 /// The drag channel's scale is wrong.
 pub struct ForceGain;
 
 impl Describe for ForceGain {
-    fn id(&self) -> Id {
-        Id::ForceGain
-    }
-    fn stage(&self) -> Stage {
-        Stage::Vehicle
-    }
-    fn acts_also_at(&self) -> Option<Stage> {
-        Some(Stage::Wheel)
-    }
-    fn drawn_over(&self) -> Against {
-        Against::Drag
+    fn facts(&self) -> Facts {
+        Facts {
+            acts_also_at: Some(Stage::Wheel),
+            drawn_over: Against::Drag,
+            ..Facts::of(Id::ForceGain, Stage::Vehicle, "reading = gain * drag")
+        }
     }
     fn parameters(&self, _context: &Context) -> Vec<Parameter> {
         vec![Parameter::new("gain_error", "1", -0.6, 1.5)]
-    }
-    fn starts(
-        &self,
-        _context: &Context,
-        _series: &[Series],
-        _evidence: &[Residuals],
-    ) -> Vec<Vec<f64>> {
-        vec![vec![0.0]]
-    }
-    fn equation(&self) -> &'static str {
-        "reading = gain * drag"
     }
     fn statement(&self, reported: &[Reported<f64>], _p: &[f64]) -> String {
         format!(
@@ -79,10 +57,7 @@ impl Describe for ForceGain {
                 "the scale of the drag channel: peak friction is wrong by the same factor",
             ),
             carried: "as it is; the load cell of a fresh run reads as wrongly",
-            example: Example {
-                form: "",
-                parameters: &[0.1],
-            },
+            example: Example::of("", &[0.1]),
         }
     }
 }
@@ -91,17 +66,7 @@ impl<T: Number> Mechanism<T> for ForceGain {
     fn apply(&self, p: &[T], _series: &Series, _context: &Context, state: &mut State<T>) {
         state.gain_change += p[0];
     }
-    fn report(
-        &self,
-        p: &[T],
-        _law: &Law<T>,
-        _context: &Context,
-        _series: &[Series],
-    ) -> Vec<Reported<T>> {
-        vec![Reported {
-            name: "gain",
-            unit: "1",
-            value: p[0] + 1.0,
-        }]
+    fn report(&self, p: &[T], _fitted: &Fitted<'_, T>) -> Vec<Reported<T>> {
+        vec![Reported::new("gain", "1", p[0] + 1.0)]
     }
 }

@@ -1,49 +1,29 @@
 //! The drag channel passes a first-order low-pass filter.
 
 use super::filters::first_order;
-use super::guide::runs;
-use super::{
-    Alias, Balance, Compensation, Context, Describe, Example, Guide, Id, Kind, Law, Mechanism,
-    Memory, Parameter, Reported, Residuals, Sign, Stage, State,
-};
-use crate::number::Number;
-use crate::series::Series;
+use super::late;
+use super::prelude::*;
 
 /// The drag channel passes a first-order low-pass filter.
 pub struct ForceLag;
 
 impl Describe for ForceLag {
-    fn id(&self) -> Id {
-        Id::ForceLag
-    }
-    fn stage(&self) -> Stage {
-        Stage::Filter
+    fn facts(&self) -> Facts {
+        Facts::of(
+            Id::ForceLag,
+            Stage::Filter,
+            "time_constant * d(reading)/dt + reading = drag",
+        )
     }
     fn memory_s(&self, p: &[f64], _context: &Context) -> Option<f64> {
         p.first().copied()
     }
     fn parameters(&self, context: &Context) -> Vec<Parameter> {
-        vec![Parameter::new(
-            "time_constant",
-            "s",
-            1e-5,
-            0.5_f64.min(0.25 * context.duration),
-        )]
+        let most = late::longest(0.5, context);
+        vec![Parameter::new("time_constant", "s", 1e-5, most)]
     }
-    fn starts(
-        &self,
-        context: &Context,
-        _series: &[Series],
-        _evidence: &[Residuals],
-    ) -> Vec<Vec<f64>> {
-        [0.6, 2.0, 6.0, 20.0, 60.0, 150.0]
-            .iter()
-            .map(|m| vec![m * 1e-3])
-            .filter(|s| s[0] > 0.2 * context.dt)
-            .collect()
-    }
-    fn equation(&self) -> &'static str {
-        "time_constant * d(reading)/dt + reading = drag"
+    fn starts(&self, search: &Search<'_>) -> Vec<Vec<f64>> {
+        late::starts(&[0.6, 2.0, 6.0, 20.0, 60.0, 150.0], search.context)
     }
     fn statement(&self, reported: &[Reported<f64>], _p: &[f64]) -> String {
         format!(
@@ -86,10 +66,7 @@ impl Describe for ForceLag {
                 "filters the slip and the load (or the friction) by the same time constant",
             ),
             carried: "as it is: settled at the run's first sample",
-            example: Example {
-                form: "",
-                parameters: &[0.03],
-            },
+            example: Example::of("", &[0.03]),
         }
     }
 }
@@ -99,17 +76,7 @@ impl<T: Number> Mechanism<T> for ForceLag {
         let rate = T::constant(1.0) / p[0];
         first_order(&mut state.force, |k| rate * series.dt[k]);
     }
-    fn report(
-        &self,
-        p: &[T],
-        _law: &Law<T>,
-        _context: &Context,
-        _series: &[Series],
-    ) -> Vec<Reported<T>> {
-        vec![Reported {
-            name: "time_constant",
-            unit: "s",
-            value: p[0],
-        }]
+    fn report(&self, p: &[T], _fitted: &Fitted<'_, T>) -> Vec<Reported<T>> {
+        vec![Reported::new("time_constant", "s", p[0])]
     }
 }

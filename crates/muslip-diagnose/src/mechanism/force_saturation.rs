@@ -1,11 +1,6 @@
 //! The drag channel clips.
 
-use super::{
-    Balance, Compensation, Context, Describe, Example, Guide, Id, Kind, Law, Mechanism, Memory,
-    Parameter, Reported, Residuals, Sign, Stage, State,
-};
-use crate::number::Number;
-use crate::series::Series;
+use super::prelude::*;
 
 /// How the drag channel comes to its limit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -30,17 +25,19 @@ pub struct ForceSaturation {
 }
 
 impl Describe for ForceSaturation {
-    fn id(&self) -> Id {
-        Id::ForceSaturation
-    }
-    fn form(&self) -> &'static str {
-        match self.form {
-            Form::Hard => "",
-            Form::Soft => "soft",
+    fn facts(&self) -> Facts {
+        let (form, equation) = match self.form {
+            Form::Hard => ("", "reading = min(drag, limit)"),
+            Form::Soft => (
+                "soft",
+                "reading = drag / (1 + (drag / limit)^sharpness)^(1 / sharpness)",
+            ),
+        };
+        Facts {
+            form,
+            amplitude: None,
+            ..Facts::of(Id::ForceSaturation, Stage::Input, equation)
         }
-    }
-    fn stage(&self) -> Stage {
-        Stage::Input
     }
     fn parameters(&self, context: &Context) -> Vec<Parameter> {
         let limit = Parameter::new(
@@ -55,13 +52,8 @@ impl Describe for ForceSaturation {
             Form::Soft => vec![limit, Parameter::new("sharpness", "1", low, high)],
         }
     }
-    fn starts(
-        &self,
-        context: &Context,
-        _series: &[Series],
-        _evidence: &[Residuals],
-    ) -> Vec<Vec<f64>> {
-        let largest = context.max_drag - 1.5 * context.drag_sigma;
+    fn starts(&self, search: &Search<'_>) -> Vec<Vec<f64>> {
+        let largest = search.context.max_drag - 1.5 * search.context.drag_sigma;
         match self.form {
             Form::Hard => [0.995, 0.97, 0.93, 0.88, 0.8, 0.7]
                 .iter()
@@ -71,15 +63,6 @@ impl Describe for ForceSaturation {
                 .iter()
                 .map(|m| vec![m * largest, 8.0])
                 .collect(),
-        }
-    }
-    fn amplitude(&self) -> Option<usize> {
-        None
-    }
-    fn equation(&self) -> &'static str {
-        match self.form {
-            Form::Hard => "reading = min(drag, limit)",
-            Form::Soft => "reading = drag / (1 + (drag / limit)^sharpness)^(1 / sharpness)",
         }
     }
     fn statement(&self, reported: &[Reported<f64>], _p: &[f64]) -> String {
@@ -95,12 +78,9 @@ impl Describe for ForceSaturation {
             aliases: &[],
             smallest: "a limit five percent below the largest drag",
             smallest_size: |c| 0.05 * c.max_drag,
-            compensation: Compensation::Not("the filter has no compensation for it"),
+            compensation: Compensation::NOT_IN_THE_FILTER,
             carried: "as it is",
-            example: Example {
-                form: "",
-                parameters: &[2600.0],
-            },
+            example: Example::of("", &[2600.0]),
         }
     }
 }
@@ -115,18 +95,8 @@ impl<T: Number> Mechanism<T> for ForceSaturation {
             };
         }
     }
-    fn report(
-        &self,
-        p: &[T],
-        _law: &Law<T>,
-        _context: &Context,
-        _series: &[Series],
-    ) -> Vec<Reported<T>> {
-        vec![Reported {
-            name: "limit",
-            unit: "N",
-            value: p[0],
-        }]
+    fn report(&self, p: &[T], _fitted: &Fitted<'_, T>) -> Vec<Reported<T>> {
+        vec![Reported::new("limit", "N", p[0])]
     }
 }
 

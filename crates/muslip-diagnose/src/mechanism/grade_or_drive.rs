@@ -1,40 +1,20 @@
 //! A constant deceleration or acceleration that is not tyre drag.
 
-use super::guide::runs;
-use super::{
-    Against, Alias, Balance, Compensation, Context, Describe, Example, Guide, Id, Kind, Law,
-    Mechanism, Memory, Parameter, Reported, Residuals, Sign, Stage, State,
-};
-use crate::number::Number;
-use crate::series::Series;
+use super::prelude::*;
 
 /// A constant deceleration or acceleration that is not tyre drag.
 pub struct GradeOrDrive;
 
 impl Describe for GradeOrDrive {
-    fn id(&self) -> Id {
-        Id::GradeOrDrive
-    }
-    fn stage(&self) -> Stage {
-        Stage::Vehicle
-    }
-    fn drawn_over(&self) -> Against {
-        Against::VehicleSpeed
+    fn facts(&self) -> Facts {
+        Facts {
+            drawn_over: Against::VehicleSpeed,
+            ..Facts::of(Id::GradeOrDrive, Stage::Vehicle, "m dv/dt = -drag - force")
+        }
     }
     fn parameters(&self, context: &Context) -> Vec<Parameter> {
         let most = 9.81 * context.mass;
         vec![Parameter::new("force", "N", -most, most)]
-    }
-    fn starts(
-        &self,
-        _context: &Context,
-        _series: &[Series],
-        _evidence: &[Residuals],
-    ) -> Vec<Vec<f64>> {
-        vec![vec![0.0]]
-    }
-    fn equation(&self) -> &'static str {
-        "m dv/dt = -drag - force"
     }
     fn statement(&self, reported: &[Reported<f64>], _p: &[f64]) -> String {
         format!(
@@ -61,12 +41,9 @@ impl Describe for GradeOrDrive {
             }],
             smallest: "three percent of the largest drag",
             smallest_size: |c| 0.03 * c.max_drag.max(c.drag_sigma),
-            compensation: Compensation::Not("not of the tyre balance: it does not touch the curve"),
+            compensation: Compensation::NOT_OF_THE_TYRE,
             carried: "as it is, on the same track in the same direction",
-            example: Example {
-                form: "",
-                parameters: &[-300.0],
-            },
+            example: Example::of("", &[-300.0]),
         }
     }
 }
@@ -77,17 +54,7 @@ impl<T: Number> Mechanism<T> for GradeOrDrive {
             *f += p[0];
         }
     }
-    fn report(
-        &self,
-        p: &[T],
-        _law: &Law<T>,
-        _context: &Context,
-        _series: &[Series],
-    ) -> Vec<Reported<T>> {
-        vec![Reported {
-            name: "force",
-            unit: "N",
-            value: p[0],
-        }]
+    fn report(&self, p: &[T], _fitted: &Fitted<'_, T>) -> Vec<Reported<T>> {
+        vec![Reported::new("force", "N", p[0])]
     }
 }

@@ -124,6 +124,14 @@ pub enum Compensation {
     Not(&'static str),
 }
 
+impl Compensation {
+    /// What acts on vehicle or wheel.
+    pub const NOT_OF_THE_TYRE: Self =
+        Self::Not("not of the tyre balance: it does not touch the curve");
+    /// What could be compensated but is not.
+    pub const NOT_IN_THE_FILTER: Self = Self::Not("the filter has no compensation for it");
+}
+
 /// Two mechanisms that can be mistaken for each other, said by one of them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Alias {
@@ -142,6 +150,14 @@ pub struct Example {
     pub form: &'static str,
     /// Its parameters.
     pub parameters: &'static [f64],
+}
+
+impl Example {
+    /// This form with these parameters.
+    #[must_use]
+    pub const fn of(form: &'static str, parameters: &'static [f64]) -> Self {
+        Self { form, parameters }
+    }
 }
 
 /// The field guide's section of a mechanism, beside what [`Describe`](super::Describe) says already.

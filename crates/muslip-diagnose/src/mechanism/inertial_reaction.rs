@@ -1,22 +1,17 @@
 //! The drag channel also reads a share of the wheel's angular acceleration.
 
-use super::guide::runs;
-use super::{
-    Alias, Balance, Compensation, Context, Describe, Example, Guide, Id, Kind, Law, Mechanism,
-    Memory, Parameter, Reported, Residuals, Sign, Stage, State,
-};
-use crate::number::Number;
-use crate::series::Series;
+use super::prelude::*;
 
 /// The drag channel also reads a share of the wheel's angular acceleration.
 pub struct InertialReaction;
 
 impl Describe for InertialReaction {
-    fn id(&self) -> Id {
-        Id::InertialReaction
-    }
-    fn stage(&self) -> Stage {
-        Stage::Reading
+    fn facts(&self) -> Facts {
+        Facts::of(
+            Id::InertialReaction,
+            Stage::Reading,
+            "reading = drag + share * d(omega)/dt",
+        )
     }
     fn parameters(&self, context: &Context) -> Vec<Parameter> {
         // A wheel inertia in the wrong place would give inertia/radius.
@@ -27,17 +22,6 @@ impl Describe for InertialReaction {
             -5.0 * natural,
             5.0 * natural,
         )]
-    }
-    fn starts(
-        &self,
-        _context: &Context,
-        _series: &[Series],
-        _evidence: &[Residuals],
-    ) -> Vec<Vec<f64>> {
-        vec![vec![0.0]]
-    }
-    fn equation(&self) -> &'static str {
-        "reading = drag + share * d(omega)/dt"
     }
     fn statement(&self, reported: &[Reported<f64>], _p: &[f64]) -> String {
         format!(
@@ -66,12 +50,9 @@ impl Describe for InertialReaction {
             ],
             smallest: "a tenth of what the wheel's whole inertia would make at its radius",
             smallest_size: |c| 0.1 * c.inertia / c.radius.max(0.005),
-            compensation: Compensation::Not("the filter has no compensation for it"),
+            compensation: Compensation::NOT_IN_THE_FILTER,
             carried: "as it is, from the fresh run's own wheel speed",
-            example: Example {
-                form: "",
-                parameters: &[1.5],
-            },
+            example: Example::of("", &[1.5]),
         }
     }
 }
@@ -82,17 +63,7 @@ impl<T: Number> Mechanism<T> for InertialReaction {
             *y += p[0] * *a;
         }
     }
-    fn report(
-        &self,
-        p: &[T],
-        _law: &Law<T>,
-        _context: &Context,
-        _series: &[Series],
-    ) -> Vec<Reported<T>> {
-        vec![Reported {
-            name: "share",
-            unit: "kg m",
-            value: p[0],
-        }]
+    fn report(&self, p: &[T], _fitted: &Fitted<'_, T>) -> Vec<Reported<T>> {
+        vec![Reported::new("share", "kg m", p[0])]
     }
 }

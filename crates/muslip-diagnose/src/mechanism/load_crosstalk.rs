@@ -1,36 +1,20 @@
 //! The drag channel reads a share of the normal force, also at standstill.
 
-use super::guide::runs;
-use super::{
-    Alias, Balance, Compensation, Context, Describe, Example, Guide, Id, Kind, Law, Mechanism,
-    Memory, Parameter, Reported, Residuals, Sign, Stage, State,
-};
-use crate::number::Number;
-use crate::series::Series;
+use super::prelude::*;
 
 /// The drag channel reads a share of the normal force, also at standstill.
 pub struct LoadCrosstalk;
 
 impl Describe for LoadCrosstalk {
-    fn id(&self) -> Id {
-        Id::LoadCrosstalk
-    }
-    fn stage(&self) -> Stage {
-        Stage::Reading
+    fn facts(&self) -> Facts {
+        Facts::of(
+            Id::LoadCrosstalk,
+            Stage::Reading,
+            "reading = drag + share * normal_force",
+        )
     }
     fn parameters(&self, _context: &Context) -> Vec<Parameter> {
         vec![Parameter::new("share", "1", -0.3, 0.3)]
-    }
-    fn starts(
-        &self,
-        _context: &Context,
-        _series: &[Series],
-        _evidence: &[Residuals],
-    ) -> Vec<Vec<f64>> {
-        vec![vec![0.0]]
-    }
-    fn equation(&self) -> &'static str {
-        "reading = drag + share * normal_force"
     }
     fn statement(&self, reported: &[Reported<f64>], _p: &[f64]) -> String {
         format!(
@@ -66,10 +50,7 @@ impl Describe for LoadCrosstalk {
             smallest_size: |_| 0.01,
             compensation: Compensation::By("takes the share of the sample's load off the drag"),
             carried: "as it is, from the fresh run's own load",
-            example: Example {
-                form: "",
-                parameters: &[0.03],
-            },
+            example: Example::of("", &[0.03]),
         }
     }
 }
@@ -80,17 +61,7 @@ impl<T: Number> Mechanism<T> for LoadCrosstalk {
             *y += *n * p[0];
         }
     }
-    fn report(
-        &self,
-        p: &[T],
-        _law: &Law<T>,
-        _context: &Context,
-        _series: &[Series],
-    ) -> Vec<Reported<T>> {
-        vec![Reported {
-            name: "share",
-            unit: "1",
-            value: p[0],
-        }]
+    fn report(&self, p: &[T], _fitted: &Fitted<'_, T>) -> Vec<Reported<T>> {
+        vec![Reported::new("share", "1", p[0])]
     }
 }

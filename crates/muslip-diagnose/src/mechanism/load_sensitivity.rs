@@ -1,11 +1,6 @@
 //! Peak friction changes with normal force.
 
-use super::{
-    Balance, Compensation, Context, Describe, Example, Guide, Id, Kind, Law, Mechanism, Memory,
-    Parameter, Reported, Residuals, Sign, Stage, State,
-};
-use crate::number::Number;
-use crate::series::Series;
+use super::prelude::*;
 
 /// Peak friction changes with normal force.
 pub struct LoadSensitivity {
@@ -14,18 +9,20 @@ pub struct LoadSensitivity {
 }
 
 impl Describe for LoadSensitivity {
-    fn id(&self) -> Id {
-        Id::LoadSensitivity
-    }
-    fn form(&self) -> &'static str {
-        if self.with_stiffness {
+    fn facts(&self) -> Facts {
+        let form = if self.with_stiffness {
             "peak_and_critical_slip"
         } else {
             "peak"
+        };
+        Facts {
+            form,
+            ..Facts::of(
+                Id::LoadSensitivity,
+                Stage::Law,
+                "peak_friction = peak_friction0 * (normal_force/mean)^(-load_sensitivity)",
+            )
         }
-    }
-    fn stage(&self) -> Stage {
-        Stage::Law
     }
     fn parameters(&self, _context: &Context) -> Vec<Parameter> {
         let mut all = vec![Parameter::new("load_sensitivity", "1", -1.5, 1.5)];
@@ -33,17 +30,6 @@ impl Describe for LoadSensitivity {
             all.push(Parameter::new("critical_slip_exponent", "1", -2.0, 2.0));
         }
         all
-    }
-    fn starts(
-        &self,
-        _context: &Context,
-        _series: &[Series],
-        _evidence: &[Residuals],
-    ) -> Vec<Vec<f64>> {
-        vec![vec![0.0; if self.with_stiffness { 2 } else { 1 }]]
-    }
-    fn equation(&self) -> &'static str {
-        "peak_friction = peak_friction0 * (normal_force/mean)^(-load_sensitivity)"
     }
     fn statement(&self, reported: &[Reported<f64>], _p: &[f64]) -> String {
         format!(
@@ -65,10 +51,7 @@ impl Describe for LoadSensitivity {
                 "divides peak friction (and the slip at the peak) by their dependence on the sample's load; the estimate holds at the campaign's mean load",
             ),
             carried: "as it is, from the fresh run's own load",
-            example: Example {
-                form: "peak",
-                parameters: &[0.3],
-            },
+            example: Example::of("peak", &[0.3]),
         }
     }
 }
@@ -90,17 +73,7 @@ impl<T: Number> Mechanism<T> for LoadSensitivity {
             state.scale_critical(&critical);
         }
     }
-    fn report(
-        &self,
-        p: &[T],
-        _law: &Law<T>,
-        _context: &Context,
-        _series: &[Series],
-    ) -> Vec<Reported<T>> {
-        vec![Reported {
-            name: "load_sensitivity",
-            unit: "1",
-            value: p[0],
-        }]
+    fn report(&self, p: &[T], _fitted: &Fitted<'_, T>) -> Vec<Reported<T>> {
+        vec![Reported::new("load_sensitivity", "1", p[0])]
     }
 }

@@ -117,10 +117,7 @@ impl Form {
             power += own[0].squared() + own[1].squared();
             phases += 1.0;
         }
-        vec![Reported {
-            name: "amplitude",
-            unit: "1",
-            value: (power / phases).sqrt() * factor,
-        }]
+        let amplitude = (power / phases).sqrt() * factor;
+        vec![Reported::new("amplitude", "1", amplitude)]
     }
 }

@@ -1,12 +1,7 @@
 //! Force builds up over a rolling distance (lag time = length / speed).
 
 use super::filters::first_order;
-use super::{
-    Balance, Compensation, Context, Describe, Example, Guide, Id, Kind, Law, Mechanism, Memory,
-    Parameter, Reported, Residuals, Sign, Stage, State,
-};
-use crate::number::Number;
-use crate::series::Series;
+use super::prelude::*;
 
 /// What is delayed by rolling.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -27,19 +22,22 @@ pub struct RelaxationLength {
 }
 
 impl Describe for RelaxationLength {
-    fn id(&self) -> Id {
-        Id::RelaxationLength
-    }
-    fn form(&self) -> &'static str {
-        match self.form {
-            Form::Slip => "slip",
-            Form::Force => "force",
-        }
-    }
-    fn stage(&self) -> Stage {
-        match self.form {
-            Form::Slip => Stage::Slip,
-            Form::Force => Stage::Contact,
+    fn facts(&self) -> Facts {
+        let (form, stage, equation) = match self.form {
+            Form::Slip => (
+                "slip",
+                Stage::Slip,
+                "drag = normal_force * mu(slip'), length * d(slip')/dt = v * (slip - slip')",
+            ),
+            Form::Force => (
+                "force",
+                Stage::Contact,
+                "length * d(drag)/dt = v * (normal_force * mu(slip) - drag)",
+            ),
+        };
+        Facts {
+            form,
+            ..Facts::of(Id::RelaxationLength, stage, equation)
         }
     }
     fn memory_s(&self, p: &[f64], context: &Context) -> Option<f64> {
@@ -53,24 +51,11 @@ impl Describe for RelaxationLength {
             (8.0 * context.radius).max(0.05),
         )]
     }
-    fn starts(
-        &self,
-        context: &Context,
-        _series: &[Series],
-        _evidence: &[Residuals],
-    ) -> Vec<Vec<f64>> {
+    fn starts(&self, search: &Search<'_>) -> Vec<Vec<f64>> {
         [0.08, 0.25, 0.7, 1.5, 3.0]
             .iter()
-            .map(|m| vec![m * context.radius])
+            .map(|m| vec![m * search.context.radius])
             .collect()
-    }
-    fn equation(&self) -> &'static str {
-        match self.form {
-            Form::Slip => {
-                "drag = normal_force * mu(slip'), length * d(slip')/dt = v * (slip - slip')"
-            }
-            Form::Force => "length * d(drag)/dt = v * (normal_force * mu(slip) - drag)",
-        }
     }
     fn statement(&self, reported: &[Reported<f64>], _p: &[f64]) -> String {
         format!("force builds up over {:.3} m of rolling", reported[0].value)
@@ -89,10 +74,7 @@ impl Describe for RelaxationLength {
                 "filters the slip (or the friction) that the update is given by the same distance",
             ),
             carried: "as it is: settled at the run's first sample",
-            example: Example {
-                form: "slip",
-                parameters: &[0.6],
-            },
+            example: Example::of("slip", &[0.6]),
         }
     }
 }
@@ -112,17 +94,7 @@ impl<T: Number> Mechanism<T> for RelaxationLength {
             Form::Force => first_order(&mut state.force, step),
         }
     }
-    fn report(
-        &self,
-        p: &[T],
-        _law: &Law<T>,
-        _context: &Context,
-        _series: &[Series],
-    ) -> Vec<Reported<T>> {
-        vec![Reported {
-            name: "length",
-            unit: "m",
-            value: p[0],
-        }]
+    fn report(&self, p: &[T], _fitted: &Fitted<'_, T>) -> Vec<Reported<T>> {
+        vec![Reported::new("length", "m", p[0])]
     }
 }

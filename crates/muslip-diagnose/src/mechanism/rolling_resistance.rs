@@ -1,12 +1,6 @@
 //! Drag on a rolling, unbraked wheel, proportional to load, absent at standstill.
 
-use super::guide::runs;
-use super::{
-    Alias, Balance, Compensation, Context, Describe, Example, Guide, Id, Kind, Law, Mechanism,
-    Memory, Parameter, Reported, Residuals, Sign, Stage, State,
-};
-use crate::number::Number;
-use crate::series::Series;
+use super::prelude::*;
 
 /// Drag on a rolling, unbraked wheel, proportional to load, absent at standstill.
 pub struct RollingResistance {
@@ -15,18 +9,20 @@ pub struct RollingResistance {
 }
 
 impl Describe for RollingResistance {
-    fn id(&self) -> Id {
-        Id::RollingResistance
-    }
-    fn form(&self) -> &'static str {
-        if self.growing {
+    fn facts(&self) -> Facts {
+        let form = if self.growing {
             "growing_with_speed"
         } else {
             "constant"
+        };
+        Facts {
+            form,
+            ..Facts::of(
+                Id::RollingResistance,
+                Stage::Contact,
+                "drag = normal_force * (mu(slip) + coefficient)",
+            )
         }
-    }
-    fn stage(&self) -> Stage {
-        Stage::Contact
     }
     fn parameters(&self, _context: &Context) -> Vec<Parameter> {
         let mut all = vec![Parameter::new("coefficient", "1", -0.02, 0.15)];
@@ -35,20 +31,12 @@ impl Describe for RollingResistance {
         }
         all
     }
-    fn starts(
-        &self,
-        _context: &Context,
-        _series: &[Series],
-        _evidence: &[Residuals],
-    ) -> Vec<Vec<f64>> {
+    fn starts(&self, _search: &Search<'_>) -> Vec<Vec<f64>> {
         vec![if self.growing {
             vec![0.01, 0.0]
         } else {
             vec![0.0]
         }]
-    }
-    fn equation(&self) -> &'static str {
-        "drag = normal_force * (mu(slip) + coefficient)"
     }
     fn statement(&self, reported: &[Reported<f64>], _p: &[f64]) -> String {
         format!(
@@ -77,12 +65,9 @@ impl Describe for RollingResistance {
             ],
             smallest: "one percent of the load",
             smallest_size: |_| 0.01,
-            compensation: Compensation::Not("the filter has no compensation for it"),
+            compensation: Compensation::NOT_IN_THE_FILTER,
             carried: "as it is, from the fresh run's own load and speed",
-            example: Example {
-                form: "constant",
-                parameters: &[0.015],
-            },
+            example: Example::of("constant", &[0.015]),
         }
     }
 }
@@ -109,17 +94,7 @@ impl<T: Number> Mechanism<T> for RollingResistance {
             state.rolling_moment = Some(moment);
         }
     }
-    fn report(
-        &self,
-        p: &[T],
-        _law: &Law<T>,
-        _context: &Context,
-        _series: &[Series],
-    ) -> Vec<Reported<T>> {
-        vec![Reported {
-            name: "coefficient",
-            unit: "1",
-            value: p[0],
-        }]
+    fn report(&self, p: &[T], _fitted: &Fitted<'_, T>) -> Vec<Reported<T>> {
+        vec![Reported::new("coefficient", "1", p[0])]
     }
 }

@@ -1,12 +1,7 @@
 //! Drag varies once (or a few times) a wheel revolution.
 
 use super::once_a_turn::Form;
-use super::{
-    Alias, Balance, Compensation, Context, Describe, Example, Guide, Id, Kind, Law, Mechanism,
-    Memory, Parameter, Reported, Residuals, Sign, Stage, State,
-};
-use crate::number::Number;
-use crate::series::Series;
+use super::prelude::*;
 
 /// Largest amplitude of an order, as a share of the drag.
 const LIMIT: f64 = 0.5;
@@ -31,20 +26,27 @@ pub struct RunOut {
 }
 
 impl Describe for RunOut {
-    fn id(&self) -> Id {
-        Id::RunOut
-    }
-    fn form(&self) -> &'static str {
-        match (self.of, self.form.phase_per_run) {
-            (Of::Drag, _) => self.form.as_str(),
-            (Of::Radius, false) => "radius",
-            (Of::Radius, true) => "radius_phase_per_run",
-        }
-    }
-    fn stage(&self) -> Stage {
-        match self.of {
-            Of::Drag => Stage::Contact,
-            Of::Radius => Stage::Kinematics,
+    fn facts(&self) -> Facts {
+        let (form, stage, equation) = match self.of {
+            Of::Drag => (
+                self.form.as_str(),
+                Stage::Contact,
+                "drag = normal_force mu(slip) (1 + sum a_k cos(k angle) + b_k sin(k angle))",
+            ),
+            Of::Radius => (
+                if self.form.phase_per_run {
+                    "radius_phase_per_run"
+                } else {
+                    "radius"
+                },
+                Stage::Kinematics,
+                "slip = 1 - radius (1 + a cos(angle) + b sin(angle)) omega / v",
+            ),
+        };
+        Facts {
+            form,
+            rare: self.of == Of::Radius,
+            ..Facts::of(Id::RunOut, stage, equation)
         }
     }
     fn parameters(&self, context: &Context) -> Vec<Parameter> {
@@ -54,25 +56,12 @@ impl Describe for RunOut {
         };
         self.form.parameters(context, limit)
     }
-    fn starts(
-        &self,
-        context: &Context,
-        series: &[Series],
-        _evidence: &[Residuals],
-    ) -> Vec<Vec<f64>> {
+    fn starts(&self, search: &Search<'_>) -> Vec<Vec<f64>> {
         // Without the wheel's balance a radius that varies is the same as an encoder that ripples, which is common.
-        if self.of == Of::Radius && series.iter().all(|s| s.wheel_balance.is_empty()) {
+        if self.of == Of::Radius && search.series.iter().all(|s| s.wheel_balance.is_empty()) {
             return Vec::new();
         }
-        self.form.starts(context)
-    }
-    fn equation(&self) -> &'static str {
-        match self.of {
-            Of::Drag => {
-                "drag = normal_force mu(slip) (1 + sum a_k cos(k angle) + b_k sin(k angle))"
-            }
-            Of::Radius => "slip = 1 - radius (1 + a cos(angle) + b sin(angle)) omega / v",
-        }
+        self.form.starts(search.context)
     }
     fn statement(&self, reported: &[Reported<f64>], _p: &[f64]) -> String {
         let percent = 100.0 * reported[0].value;
@@ -82,12 +71,6 @@ impl Describe for RunOut {
                 "the rolling radius varies once a wheel revolution; the drag at half the critical slip by {percent:.2} % of itself"
             ),
         }
-    }
-    fn predicts(&self) -> bool {
-        !self.form.phase_per_run
-    }
-    fn rare(&self) -> bool {
-        self.of == Of::Radius
     }
     fn guide(&self) -> Guide {
         Guide {
@@ -105,10 +88,7 @@ impl Describe for RunOut {
             smallest_size: |_| 0.03,
             compensation: Compensation::Not("needs the wheel's angle, which a sample lacks"),
             carried: "its size as it is; its phase only where the wheel's angle is known from run to run",
-            example: Example {
-                form: "first_order",
-                parameters: &[0.06, 0.0],
-            },
+            example: Example::of("first_order", &[0.06, 0.0]),
         }
     }
 }
@@ -134,17 +114,11 @@ impl<T: Number> Mechanism<T> for RunOut {
             }
         }
     }
-    fn report(
-        &self,
-        p: &[T],
-        law: &Law<T>,
-        _context: &Context,
-        _series: &[Series],
-    ) -> Vec<Reported<T>> {
+    fn report(&self, p: &[T], fitted: &Fitted<'_, T>) -> Vec<Reported<T>> {
         let factor = match self.of {
             Of::Drag => 1.0,
             // On the base curve d ln mu / d slip is 1.2 / critical slip at half of that.
-            Of::Radius => 1.2 / law.critical.value(),
+            Of::Radius => 1.2 / fitted.law.critical.value(),
         };
         self.form.report(p, factor)
     }

@@ -1,21 +1,17 @@
 //! Rising slip and falling slip follow different curves, whatever the rate.
 
-use super::{
-    Balance, Compensation, Context, Describe, Example, Guide, Id, Kind, Law, Mechanism, Memory,
-    Parameter, Reported, Residuals, Sign, Stage, State,
-};
-use crate::number::Number;
-use crate::series::Series;
+use super::prelude::*;
 
 /// Rising slip and falling slip follow different curves, whatever the rate.
 pub struct SlipHysteresis;
 
 impl Describe for SlipHysteresis {
-    fn id(&self) -> Id {
-        Id::SlipHysteresis
-    }
-    fn stage(&self) -> Stage {
-        Stage::Friction
+    fn facts(&self) -> Facts {
+        Facts::of(
+            Id::SlipHysteresis,
+            Stage::Friction,
+            "friction = mu(slip) * (1 + loop_share * z), dz/d(slip) = (sign(d slip) - z)/width * sign(d slip)",
+        )
     }
     fn parameters(&self, _context: &Context) -> Vec<Parameter> {
         vec![
@@ -23,16 +19,8 @@ impl Describe for SlipHysteresis {
             Parameter::new("width", "1", 0.001, 0.15),
         ]
     }
-    fn starts(
-        &self,
-        _context: &Context,
-        _series: &[Series],
-        _evidence: &[Residuals],
-    ) -> Vec<Vec<f64>> {
+    fn starts(&self, _search: &Search<'_>) -> Vec<Vec<f64>> {
         [0.003, 0.012, 0.04].iter().map(|w| vec![0.0, *w]).collect()
-    }
-    fn equation(&self) -> &'static str {
-        "friction = mu(slip) * (1 + loop_share * z), dz/d(slip) = (sign(d slip) - z)/width * sign(d slip)"
     }
     fn statement(&self, reported: &[Reported<f64>], _p: &[f64]) -> String {
         format!(
@@ -50,12 +38,9 @@ impl Describe for SlipHysteresis {
             aliases: &[],
             smallest: "half a loop's height of three percent of friction",
             smallest_size: |_| 0.03,
-            compensation: Compensation::Not("the filter has no compensation for it"),
+            compensation: Compensation::NOT_IN_THE_FILTER,
             carried: "as it is: on the middle of the loop at the run's first sample",
-            example: Example {
-                form: "",
-                parameters: &[0.08, 0.02],
-            },
+            example: Example::of("", &[0.08, 0.02]),
         }
     }
 }
@@ -74,17 +59,7 @@ impl<T: Number> Mechanism<T> for SlipHysteresis {
             state.friction[k] = state.friction[k] * (p[0] * z + 1.0);
         }
     }
-    fn report(
-        &self,
-        p: &[T],
-        _law: &Law<T>,
-        _context: &Context,
-        _series: &[Series],
-    ) -> Vec<Reported<T>> {
-        vec![Reported {
-            name: "loop_share",
-            unit: "1",
-            value: p[0].abs(),
-        }]
+    fn report(&self, p: &[T], _fitted: &Fitted<'_, T>) -> Vec<Reported<T>> {
+        vec![Reported::new("loop_share", "1", p[0].abs())]
     }
 }

@@ -5,43 +5,40 @@
 
 use core::ops::Range;
 
-use super::{Context, Parameter, Reported};
+use super::late;
+use super::{Compensation, Context, Parameter, Reported};
 use crate::cleaning::stretches;
 use crate::number::Number;
 use crate::series::{Channel, GAP_STEPS, Series};
 
 /// Largest delay either way, in s.
 const MOST_S: f64 = 0.15;
-/// The same as a share of the longest run.
-const MOST_SHARE: f64 = 0.25;
 /// Delays either way from which a search may start, in s.
 const STARTS_S: [f64; 5] = [0.0015, 0.005, 0.015, 0.04, 0.09];
-/// A start below this share of a sampling step is none.
-const LEAST_STEPS: f64 = 0.2;
+
+/// Why neither speed's delay is compensated.
+pub const COMPENSATION: Compensation = Compensation::Not(
+    "all other channels would have to wait for the late one, and the filter keeps no line of them",
+);
 
 /// The delay and its bounds.
 pub fn parameters(context: &Context) -> Vec<Parameter> {
-    let most = MOST_S.min(MOST_SHARE * context.duration);
+    let most = late::longest(MOST_S, context);
     vec![Parameter::new("delay", "s", -most, most)]
 }
 
 /// Delays from which a search may start, late and early.
 pub fn starts(context: &Context) -> Vec<Vec<f64>> {
-    let most = MOST_S.min(MOST_SHARE * context.duration);
-    STARTS_S
-        .iter()
-        .filter(|s| **s > LEAST_STEPS * context.dt && **s < most)
-        .flat_map(|s| [vec![*s], vec![-*s]])
+    let most = late::longest(MOST_S, context);
+    late::seen(STARTS_S.into_iter(), context)
+        .filter(|s| *s < most)
+        .flat_map(|s| [vec![s], vec![-s]])
         .collect()
 }
 
 /// The figure by the contract.
 pub fn report<T: Number>(p: &[T]) -> Vec<Reported<T>> {
-    vec![Reported {
-        name: "delay",
-        unit: "s",
-        value: p[0],
-    }]
+    vec![Reported::new("delay", "s", p[0])]
 }
 
 /// The sentence of a channel.

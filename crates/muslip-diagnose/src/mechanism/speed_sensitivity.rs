@@ -1,12 +1,6 @@
 //! Friction changes with sliding speed or vehicle speed.
 
-use super::guide::runs;
-use super::{
-    Alias, Balance, Compensation, Context, Describe, Example, Guide, Id, Kind, Law, Mechanism,
-    Memory, Parameter, Reported, Residuals, Sign, Stage, State,
-};
-use crate::number::Number;
-use crate::series::Series;
+use super::prelude::*;
 
 /// Forms of the dependence.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -48,20 +42,30 @@ pub struct SpeedSensitivity {
 }
 
 impl Describe for SpeedSensitivity {
-    fn id(&self) -> Id {
-        Id::SpeedSensitivity
-    }
-    fn form(&self) -> &'static str {
-        match self.form {
-            Form::SlidingLinear => "sliding_linear",
-            Form::SlidingExponential => "sliding_exponential",
-            Form::VehicleLinear => "vehicle_linear",
-            Form::VehicleExponential => "vehicle_exponential",
-            Form::Stribeck => "sliding_with_floor",
+    fn facts(&self) -> Facts {
+        let (form, equation) = match self.form {
+            Form::SlidingLinear => ("sliding_linear", "friction = mu(slip) * (1 + k * slip * v)"),
+            Form::SlidingExponential => (
+                "sliding_exponential",
+                "friction = mu(slip) * exp(k * slip * v)",
+            ),
+            Form::VehicleLinear => (
+                "vehicle_linear",
+                "friction = mu(slip) * (1 + k * (v - mean v))",
+            ),
+            Form::VehicleExponential => (
+                "vehicle_exponential",
+                "friction = mu(slip) * exp(k * (v - mean v))",
+            ),
+            Form::Stribeck => (
+                "sliding_with_floor",
+                "friction = mu(slip) * (floor + (1 - floor) exp(-slip * v / speed_scale))",
+            ),
+        };
+        Facts {
+            form,
+            ..Facts::of(Id::SpeedSensitivity, Stage::Friction, equation)
         }
-    }
-    fn stage(&self) -> Stage {
-        Stage::Friction
     }
     fn parameters(&self, context: &Context) -> Vec<Parameter> {
         let steepest = 3.0 / context.max_speed.max(0.5);
@@ -81,29 +85,13 @@ impl Describe for SpeedSensitivity {
             _ => vec![slope],
         }
     }
-    fn starts(
-        &self,
-        context: &Context,
-        _series: &[Series],
-        _evidence: &[Residuals],
-    ) -> Vec<Vec<f64>> {
+    fn starts(&self, search: &Search<'_>) -> Vec<Vec<f64>> {
         match self.form {
             Form::Stribeck => [0.03, 0.1, 0.3]
                 .iter()
-                .map(|share| vec![1.0, share * context.max_speed])
+                .map(|share| vec![1.0, share * search.context.max_speed])
                 .collect(),
             _ => vec![vec![0.0]],
-        }
-    }
-    fn equation(&self) -> &'static str {
-        match self.form {
-            Form::SlidingLinear => "friction = mu(slip) * (1 + k * slip * v)",
-            Form::SlidingExponential => "friction = mu(slip) * exp(k * slip * v)",
-            Form::VehicleLinear => "friction = mu(slip) * (1 + k * (v - mean v))",
-            Form::VehicleExponential => "friction = mu(slip) * exp(k * (v - mean v))",
-            Form::Stribeck => {
-                "friction = mu(slip) * (floor + (1 - floor) exp(-slip * v / speed_scale))"
-            }
         }
     }
     fn statement(&self, reported: &[Reported<f64>], _p: &[f64]) -> String {
@@ -147,10 +135,7 @@ impl Describe for SpeedSensitivity {
                 "divides friction by its factor at the sample's speed; the estimate holds without sliding or at the mean vehicle speed",
             ),
             carried: "as it is, from the fresh run's own speeds",
-            example: Example {
-                form: "sliding_linear",
-                parameters: &[-0.03],
-            },
+            example: Example::of("sliding_linear", &[-0.03]),
         }
     }
 }
@@ -173,25 +158,15 @@ impl<T: Number> Mechanism<T> for SpeedSensitivity {
             state.friction[k] = state.friction[k] * factor;
         }
     }
-    fn report(
-        &self,
-        p: &[T],
-        _law: &Law<T>,
-        context: &Context,
-        _series: &[Series],
-    ) -> Vec<Reported<T>> {
+    fn report(&self, p: &[T], fitted: &Fitted<'_, T>) -> Vec<Reported<T>> {
         let slope = match self.form {
             // Mean slope from rest to the mean sliding speed of a skid, a fifth of the vehicle's.
             Form::Stribeck => {
-                let sliding = 0.2 * context.mean_speed;
+                let sliding = 0.2 * fitted.context.mean_speed;
                 (p[0] - 1.0) * (-((-(T::constant(sliding) / p[1])).exp()) + 1.0) / sliding
             }
             _ => p[0],
         };
-        vec![Reported {
-            name: "friction_change_per_m_s",
-            unit: "s/m",
-            value: slope,
-        }]
+        vec![Reported::new("friction_change_per_m_s", "s/m", slope)]
     }
 }

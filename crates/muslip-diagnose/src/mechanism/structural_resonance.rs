@@ -1,14 +1,8 @@
 //! The load cell and its mount ring: a lightly damped second-order response.
 
 use super::filters::second_order;
-use super::guide::runs;
-use super::{
-    Alias, Balance, Compensation, Context, Describe, Example, Guide, Id, Kind, Law, Mechanism,
-    Memory, Parameter, Reported, Residuals, Sign, Stage, State,
-};
+use super::prelude::*;
 use crate::constants::RINGING;
-use crate::number::Number;
-use crate::series::Series;
 
 /// How much of the force passes through what rings.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -29,17 +23,24 @@ pub struct StructuralResonance {
 }
 
 impl Describe for StructuralResonance {
-    fn id(&self) -> Id {
-        Id::StructuralResonance
-    }
-    fn form(&self) -> &'static str {
-        match self.form {
-            Form::Whole => "",
-            Form::Share => "share",
+    fn facts(&self) -> Facts {
+        let (form, amplitude, equation) = match self.form {
+            Form::Whole => (
+                "",
+                None,
+                "reading'' + 2 zeta W reading' + W^2 reading = W^2 drag, W = 2 pi frequency",
+            ),
+            Form::Share => (
+                "share",
+                Some(2),
+                "reading = drag + share (y - drag), y'' + 2 zeta W y' + W^2 y = W^2 drag, W = 2 pi frequency",
+            ),
+        };
+        Facts {
+            form,
+            amplitude,
+            ..Facts::of(Id::StructuralResonance, Stage::Structure, equation)
         }
-    }
-    fn stage(&self) -> Stage {
-        Stage::Structure
     }
     fn memory_s(&self, p: &[f64], _context: &Context) -> Option<f64> {
         let omega = core::f64::consts::TAU * p.first()?;
@@ -58,13 +59,8 @@ impl Describe for StructuralResonance {
         }
         all
     }
-    fn starts(
-        &self,
-        context: &Context,
-        _series: &[Series],
-        _evidence: &[Residuals],
-    ) -> Vec<Vec<f64>> {
-        let top = 0.4 / context.dt;
+    fn starts(&self, search: &Search<'_>) -> Vec<Vec<f64>> {
+        let top = 0.4 / search.context.dt;
         let mut starts = Vec::new();
         let mut frequency = 4.0;
         while frequency < top.min(150.0) {
@@ -75,22 +71,6 @@ impl Describe for StructuralResonance {
             frequency *= 1.19;
         }
         starts
-    }
-    fn amplitude(&self) -> Option<usize> {
-        match self.form {
-            Form::Whole => None,
-            Form::Share => Some(2),
-        }
-    }
-    fn equation(&self) -> &'static str {
-        match self.form {
-            Form::Whole => {
-                "reading'' + 2 zeta W reading' + W^2 reading = W^2 drag, W = 2 pi frequency"
-            }
-            Form::Share => {
-                "reading = drag + share (y - drag), y'' + 2 zeta W y' + W^2 y = W^2 drag, W = 2 pi frequency"
-            }
-        }
     }
     fn statement(&self, reported: &[Reported<f64>], _p: &[f64]) -> String {
         format!(
@@ -122,12 +102,9 @@ impl Describe for StructuralResonance {
             ],
             smallest: "a frequency that lies within the recording's band: below about 30 Hz it disturbs a ramp",
             smallest_size: |_| 30.0,
-            compensation: Compensation::Not("the filter has no compensation for it"),
+            compensation: Compensation::NOT_IN_THE_FILTER,
             carried: "as it is: settled at the run's first sample",
-            example: Example {
-                form: "",
-                parameters: &[18.0, 0.05],
-            },
+            example: Example::of("", &[18.0, 0.05]),
         }
     }
 }
@@ -158,24 +135,10 @@ impl<T: Number> Mechanism<T> for StructuralResonance {
             }
         }
     }
-    fn report(
-        &self,
-        p: &[T],
-        _law: &Law<T>,
-        _context: &Context,
-        _series: &[Series],
-    ) -> Vec<Reported<T>> {
+    fn report(&self, p: &[T], _fitted: &Fitted<'_, T>) -> Vec<Reported<T>> {
         vec![
-            Reported {
-                name: "frequency",
-                unit: "Hz",
-                value: p[0],
-            },
-            Reported {
-                name: "damping_ratio",
-                unit: "1",
-                value: p[1],
-            },
+            Reported::new("frequency", "Hz", p[0]),
+            Reported::new("damping_ratio", "1", p[1]),
         ]
     }
 }

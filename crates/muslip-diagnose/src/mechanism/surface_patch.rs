@@ -1,12 +1,6 @@
 //! Friction differs over a stretch of the track.
 
-use super::guide::runs;
-use super::{
-    Alias, Balance, Compensation, Context, Describe, Example, Guide, Id, Kind, Law, Mechanism,
-    Memory, Parameter, Reported, Residuals, Sign, Stage, State,
-};
-use crate::number::Number;
-use crate::series::Series;
+use super::prelude::*;
 
 /// Longest stretches that are searched for, as shares of the track.
 const LONGEST: [f64; 3] = [1.0, 0.35, 0.12];
@@ -88,14 +82,16 @@ pub struct SurfacePatch {
 }
 
 impl Describe for SurfacePatch {
-    fn id(&self) -> Id {
-        Id::SurfacePatch
-    }
-    fn form(&self) -> &'static str {
-        if self.patches == 1 { "one" } else { "two" }
-    }
-    fn stage(&self) -> Stage {
-        Stage::Friction
+    fn facts(&self) -> Facts {
+        Facts {
+            form: if self.patches == 1 { "one" } else { "two" },
+            amplitude: Some(2),
+            ..Facts::of(
+                Id::SurfacePatch,
+                Stage::Friction,
+                "friction = mu(slip) * (1 + change) where start <= distance < end",
+            )
+        }
     }
     fn parameters(&self, context: &Context) -> Vec<Parameter> {
         let mut all = Vec::new();
@@ -116,13 +112,8 @@ impl Describe for SurfacePatch {
         }
         all
     }
-    fn starts(
-        &self,
-        context: &Context,
-        series: &[Series],
-        evidence: &[Residuals],
-    ) -> Vec<Vec<f64>> {
-        let fresh = Scan::new(context, series, evidence);
+    fn starts(&self, search: &Search<'_>) -> Vec<Vec<f64>> {
+        let fresh = Scan::new(search.context, search.series, search.residuals);
         let mut starts: Vec<Vec<f64>> = Vec::new();
         // What differs over most of the track hides shorter stretches.
         for longest in LONGEST {
@@ -140,12 +131,6 @@ impl Describe for SurfacePatch {
             }
         }
         starts
-    }
-    fn amplitude(&self) -> Option<usize> {
-        Some(2)
-    }
-    fn equation(&self) -> &'static str {
-        "friction = mu(slip) * (1 + change) where start <= distance < end"
     }
     fn statement(&self, reported: &[Reported<f64>], p: &[f64]) -> String {
         format!(
@@ -184,10 +169,7 @@ impl Describe for SurfacePatch {
             smallest_size: |_| 0.03,
             compensation: Compensation::Not("a property of the track, not of the tyre"),
             carried: "only to runs that start at the same place of the same track: distance counts from the first sample",
-            example: Example {
-                form: "one",
-                parameters: &[20.0, 15.0, -0.15],
-            },
+            example: Example::of("one", &[20.0, 15.0, -0.15]),
         }
     }
 }
@@ -206,21 +188,11 @@ impl<T: Number> Mechanism<T> for SurfacePatch {
             *f = *f * factor;
         }
     }
-    fn report(
-        &self,
-        p: &[T],
-        _law: &Law<T>,
-        _context: &Context,
-        _series: &[Series],
-    ) -> Vec<Reported<T>> {
+    fn report(&self, p: &[T], _fitted: &Fitted<'_, T>) -> Vec<Reported<T>> {
         let first = p
             .chunks_exact(3)
             .min_by(|a, b| a[0].value().total_cmp(&b[0].value()))
             .map_or(T::constant(0.0), |part| part[0]);
-        vec![Reported {
-            name: "start",
-            unit: "m",
-            value: first,
-        }]
+        vec![Reported::new("start", "m", first)]
     }
 }

@@ -1,12 +1,6 @@
 //! Friction changes with tread temperature, which friction power raises and time cools.
 
-use super::guide::runs;
-use super::{
-    Alias, Balance, Compensation, Context, Describe, Example, Guide, Id, Kind, Law, Mechanism,
-    Memory, Parameter, Reported, Residuals, Sign, Stage, State,
-};
-use crate::number::Number;
-use crate::series::Series;
+use super::prelude::*;
 
 /// Forms of the dependence on temperature.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -27,17 +21,21 @@ pub struct ThermalFade {
 }
 
 impl Describe for ThermalFade {
-    fn id(&self) -> Id {
-        Id::ThermalFade
-    }
-    fn form(&self) -> &'static str {
-        match self.form {
-            Form::Linear => "linear",
-            Form::Curved => "curved",
+    fn facts(&self) -> Facts {
+        let (form, equation) = match self.form {
+            Form::Linear => (
+                "linear",
+                "friction = mu(slip) exp(-c theta), d(theta)/dt = power/mean_power - theta/time_constant",
+            ),
+            Form::Curved => (
+                "curved",
+                "friction = mu(slip) exp(-c theta - c2 theta^2), d(theta)/dt = power/mean_power - theta/time_constant",
+            ),
+        };
+        Facts {
+            form,
+            ..Facts::of(Id::ThermalFade, Stage::Friction, equation)
         }
-    }
-    fn stage(&self) -> Stage {
-        Stage::Friction
     }
     fn parameters(&self, context: &Context) -> Vec<Parameter> {
         let mut all = vec![
@@ -54,15 +52,10 @@ impl Describe for ThermalFade {
         }
         all
     }
-    fn starts(
-        &self,
-        context: &Context,
-        _series: &[Series],
-        _evidence: &[Residuals],
-    ) -> Vec<Vec<f64>> {
+    fn starts(&self, search: &Search<'_>) -> Vec<Vec<f64>> {
         [0.2, 0.6, 2.0, 6.0, 20.0, 60.0]
             .iter()
-            .filter(|t| **t < 10.0 * context.duration)
+            .filter(|t| **t < 10.0 * search.context.duration)
             .map(|t| {
                 if self.form == Form::Curved {
                     vec![0.0, *t, 0.0]
@@ -71,16 +64,6 @@ impl Describe for ThermalFade {
                 }
             })
             .collect()
-    }
-    fn equation(&self) -> &'static str {
-        match self.form {
-            Form::Linear => {
-                "friction = mu(slip) exp(-c theta), d(theta)/dt = power/mean_power - theta/time_constant"
-            }
-            Form::Curved => {
-                "friction = mu(slip) exp(-c theta - c2 theta^2), d(theta)/dt = power/mean_power - theta/time_constant"
-            }
-        }
     }
     fn statement(&self, reported: &[Reported<f64>], p: &[f64]) -> String {
         format!(
@@ -129,10 +112,7 @@ impl Describe for ThermalFade {
                 "follows the temperature by the measured friction power and divides friction by its factor; the estimate holds for the cold tread",
             ),
             carried: "starts cold in every run; heated by the fresh run's own friction power",
-            example: Example {
-                form: "linear",
-                parameters: &[0.35, 4.0],
-            },
+            example: Example::of("linear", &[0.35, 4.0]),
         }
     }
 }
@@ -168,17 +148,7 @@ impl<T: Number> Mechanism<T> for ThermalFade {
             theta = (theta - settled) * stay + settled;
         }
     }
-    fn report(
-        &self,
-        p: &[T],
-        _law: &Law<T>,
-        _context: &Context,
-        _series: &[Series],
-    ) -> Vec<Reported<T>> {
-        vec![Reported {
-            name: "time_constant",
-            unit: "s",
-            value: p[1],
-        }]
+    fn report(&self, p: &[T], _fitted: &Fitted<'_, T>) -> Vec<Reported<T>> {
+        vec![Reported::new("time_constant", "s", p[1])]
     }
 }

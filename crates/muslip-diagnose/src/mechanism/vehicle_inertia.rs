@@ -1,38 +1,19 @@
 //! The translating mass is not the rig file's.
 
-use super::{
-    Against, Balance, Compensation, Context, Describe, Example, Guide, Id, Kind, Law, Mechanism,
-    Memory, Parameter, Reported, Residuals, Sign, Stage, State,
-};
-use crate::number::Number;
-use crate::series::Series;
+use super::prelude::*;
 
 /// The translating mass is not the rig file's.
 pub struct VehicleInertia;
 
 impl Describe for VehicleInertia {
-    fn id(&self) -> Id {
-        Id::VehicleInertia
-    }
-    fn stage(&self) -> Stage {
-        Stage::Vehicle
-    }
-    fn drawn_over(&self) -> Against {
-        Against::VehicleAcceleration
+    fn facts(&self) -> Facts {
+        Facts {
+            drawn_over: Against::VehicleAcceleration,
+            ..Facts::of(Id::VehicleInertia, Stage::Vehicle, "mass * dv/dt = -drag")
+        }
     }
     fn parameters(&self, _context: &Context) -> Vec<Parameter> {
         vec![Parameter::new("mass_error", "1", -0.7, 2.0)]
-    }
-    fn starts(
-        &self,
-        _context: &Context,
-        _series: &[Series],
-        _evidence: &[Residuals],
-    ) -> Vec<Vec<f64>> {
-        vec![vec![0.0]]
-    }
-    fn equation(&self) -> &'static str {
-        "mass * dv/dt = -drag"
     }
     fn statement(&self, reported: &[Reported<f64>], _p: &[f64]) -> String {
         format!("the translating mass is {:.4} kg", reported[0].value)
@@ -47,12 +28,9 @@ impl Describe for VehicleInertia {
             aliases: &[],
             smallest: "three percent of the mass",
             smallest_size: |c| 0.03 * c.mass,
-            compensation: Compensation::Not("not of the tyre balance: it does not touch the curve"),
+            compensation: Compensation::NOT_OF_THE_TYRE,
             carried: "as it is",
-            example: Example {
-                form: "",
-                parameters: &[0.15],
-            },
+            example: Example::of("", &[0.15]),
         }
     }
 }
@@ -61,17 +39,11 @@ impl<T: Number> Mechanism<T> for VehicleInertia {
     fn apply(&self, p: &[T], _series: &Series, _context: &Context, state: &mut State<T>) {
         state.inertia_change += p[0];
     }
-    fn report(
-        &self,
-        p: &[T],
-        _law: &Law<T>,
-        context: &Context,
-        _series: &[Series],
-    ) -> Vec<Reported<T>> {
-        vec![Reported {
-            name: "mass",
-            unit: "kg",
-            value: (p[0] + 1.0) * context.mass,
-        }]
+    fn report(&self, p: &[T], fitted: &Fitted<'_, T>) -> Vec<Reported<T>> {
+        vec![Reported::new(
+            "mass",
+            "kg",
+            (p[0] + 1.0) * fitted.context.mass,
+        )]
     }
 }

@@ -1,13 +1,7 @@
 //! The vehicle-speed channel reports late, relative to the other channels, by a fixed time.
 
-use super::guide::runs;
-use super::speed_delay::{parameters, report, shift, starts, statement};
-use super::{
-    Alias, Balance, Compensation, Context, Describe, Example, Guide, Id, Kind, Law, Mechanism,
-    Memory, Parameter, Reported, Residuals, Sign, Speed, Stage, State,
-};
-use crate::number::Number;
-use crate::series::Series;
+use super::prelude::*;
+use super::speed_delay;
 
 /// Slowest speed that a shifted reading may come to while the wheel rolls, in m/s: slip divides by it.
 const SLOWEST_M_S: f64 = 0.5;
@@ -16,34 +10,25 @@ const SLOWEST_M_S: f64 = 0.5;
 pub struct VehicleSpeedDelay;
 
 impl Describe for VehicleSpeedDelay {
-    fn id(&self) -> Id {
-        Id::VehicleSpeedDelay
-    }
-    fn stage(&self) -> Stage {
-        Stage::Kinematics
-    }
-    fn through_force(&self) -> bool {
-        false
-    }
-    fn late(&self) -> Option<Speed> {
-        Some(Speed::Vehicle)
+    fn facts(&self) -> Facts {
+        Facts {
+            through_force: false,
+            late: Some(Speed::Vehicle),
+            ..Facts::of(
+                Id::VehicleSpeedDelay,
+                Stage::Kinematics,
+                "measured v(t) = v(t - delay)",
+            )
+        }
     }
     fn parameters(&self, context: &Context) -> Vec<Parameter> {
-        parameters(context)
+        speed_delay::parameters(context)
     }
-    fn starts(
-        &self,
-        context: &Context,
-        _series: &[Series],
-        _evidence: &[Residuals],
-    ) -> Vec<Vec<f64>> {
-        starts(context)
-    }
-    fn equation(&self) -> &'static str {
-        "measured v(t) = v(t - delay)"
+    fn starts(&self, search: &Search<'_>) -> Vec<Vec<f64>> {
+        speed_delay::starts(search.context)
     }
     fn statement(&self, reported: &[Reported<f64>], _p: &[f64]) -> String {
-        statement("vehicle speed", reported[0].value)
+        speed_delay::statement("vehicle speed", reported[0].value)
     }
     fn guide(&self) -> Guide {
         Guide {
@@ -71,34 +56,23 @@ impl Describe for VehicleSpeedDelay {
             ],
             smallest: "five milliseconds times the deceleration over the speed is the slip that it feigns",
             smallest_size: |_| 0.005,
-            compensation: Compensation::Not(
-                "all other channels would have to wait for the late one, and the filter keeps no line of them",
-            ),
+            compensation: speed_delay::COMPENSATION,
             carried: "as it is, for the same instrument",
-            example: Example {
-                form: "",
-                parameters: &[0.06],
-            },
+            example: Example::of("", &[0.06]),
         }
     }
 }
 
 impl<T: Number> Mechanism<T> for VehicleSpeedDelay {
     fn apply(&self, p: &[T], series: &Series, _context: &Context, state: &mut State<T>) {
-        shift(&mut state.speed, &series.speed, series, p[0]);
+        speed_delay::shift(&mut state.speed, &series.speed, series, p[0]);
         for (v, rolling) in state.speed.iter_mut().zip(&series.rolling) {
             if *rolling && v.value() < SLOWEST_M_S {
                 *v = T::constant(SLOWEST_M_S);
             }
         }
     }
-    fn report(
-        &self,
-        p: &[T],
-        _law: &Law<T>,
-        _context: &Context,
-        _series: &[Series],
-    ) -> Vec<Reported<T>> {
-        report(p)
+    fn report(&self, p: &[T], _fitted: &Fitted<'_, T>) -> Vec<Reported<T>> {
+        speed_delay::report(p)
     }
 }

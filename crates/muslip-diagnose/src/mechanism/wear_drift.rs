@@ -1,12 +1,6 @@
 //! Friction shifts with accumulated sliding energy or from run to run, and does not recover.
 
-use super::guide::runs;
-use super::{
-    Alias, Balance, Compensation, Context, Describe, Example, Guide, Id, Kind, Law, Mechanism,
-    Memory, Parameter, Reported, Residuals, Sign, Stage, State,
-};
-use crate::number::Number;
-use crate::series::Series;
+use super::prelude::*;
 
 /// What friction shifts with.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -42,18 +36,22 @@ pub struct WearDrift {
 }
 
 impl Describe for WearDrift {
-    fn id(&self) -> Id {
-        Id::WearDrift
-    }
-    fn form(&self) -> &'static str {
-        match self.form {
-            Form::Energy => "energy",
-            Form::RunningIn => "running_in",
-            Form::Run => "run",
+    fn facts(&self) -> Facts {
+        let (form, equation) = match self.form {
+            Form::Energy => (
+                "energy",
+                "friction = mu(slip) exp(-loss * sliding energy / total sliding energy)",
+            ),
+            Form::RunningIn => (
+                "running_in",
+                "friction = mu(slip) exp(-loss * (1 - exp(-sliding energy / (share * total sliding energy))))",
+            ),
+            Form::Run => ("run", "friction = mu(slip) exp(-loss * run / last run)"),
+        };
+        Facts {
+            form,
+            ..Facts::of(Id::WearDrift, Stage::Friction, equation)
         }
-    }
-    fn stage(&self) -> Stage {
-        Stage::Friction
     }
     fn parameters(&self, _context: &Context) -> Vec<Parameter> {
         let mut all = vec![Parameter::new("loss", "1", -1.5, 2.5)];
@@ -62,14 +60,9 @@ impl Describe for WearDrift {
         }
         all
     }
-    fn starts(
-        &self,
-        context: &Context,
-        _series: &[Series],
-        _evidence: &[Residuals],
-    ) -> Vec<Vec<f64>> {
+    fn starts(&self, search: &Search<'_>) -> Vec<Vec<f64>> {
         match self.form {
-            Form::Run if context.runs < 2 => Vec::new(),
+            Form::Run if search.context.runs < 2 => Vec::new(),
             Form::Run | Form::Energy => vec![vec![0.0]],
             Form::RunningIn => [0.08f64, 0.25]
                 .iter()
@@ -79,17 +72,6 @@ impl Describe for WearDrift {
     }
     fn by_order(&self, _context: &Context) -> bool {
         true
-    }
-    fn equation(&self) -> &'static str {
-        match self.form {
-            Form::Energy => {
-                "friction = mu(slip) exp(-loss * sliding energy / total sliding energy)"
-            }
-            Form::RunningIn => {
-                "friction = mu(slip) exp(-loss * (1 - exp(-sliding energy / (share * total sliding energy))))"
-            }
-            Form::Run => "friction = mu(slip) exp(-loss * run / last run)",
-        }
     }
     fn statement(&self, reported: &[Reported<f64>], _p: &[f64]) -> String {
         format!(
@@ -123,12 +105,9 @@ impl Describe for WearDrift {
             ],
             smallest: "three percent of friction from the first run to the last",
             smallest_size: |_| 0.03,
-            compensation: Compensation::Not("the filter has no compensation for it"),
+            compensation: Compensation::NOT_IN_THE_FILTER,
             carried: "not to a run whose place in the campaign is not known: that is predicted by the law that fits all runs best without it",
-            example: Example {
-                form: "energy",
-                parameters: &[0.15],
-            },
+            example: Example::of("energy", &[0.15]),
         }
     }
 }
@@ -161,28 +140,18 @@ impl<T: Number> Mechanism<T> for WearDrift {
             }
         }
     }
-    fn report(
-        &self,
-        p: &[T],
-        _law: &Law<T>,
-        context: &Context,
-        series: &[Series],
-    ) -> Vec<Reported<T>> {
+    fn report(&self, p: &[T], fitted: &Fitted<'_, T>) -> Vec<Reported<T>> {
         let mean_work = |run: &Series| {
-            let all = work(run, context);
+            let all = work(run, fitted.context);
             all.iter().sum::<f64>() / all.len().max(1) as f64
         };
-        let (first, last) = match (self.form, series) {
+        let (first, last) = match (self.form, fitted.series) {
             (Form::Energy | Form::RunningIn, [first, .., last]) => {
                 (mean_work(first), mean_work(last))
             }
             _ => (0.0, 1.0),
         };
         let change = self.left(p, last) - self.left(p, first);
-        vec![Reported {
-            name: "friction_loss",
-            unit: "1",
-            value: -change.exp() + 1.0,
-        }]
+        vec![Reported::new("friction_loss", "1", -change.exp() + 1.0)]
     }
 }

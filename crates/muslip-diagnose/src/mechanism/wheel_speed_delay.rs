@@ -1,46 +1,31 @@
 //! The wheel-speed channel reports late, relative to the other channels, by a fixed time.
 
-use super::guide::runs;
-use super::speed_delay::{parameters, report, shift, starts, statement};
-use super::{
-    Alias, Balance, Compensation, Context, Describe, Example, Guide, Id, Kind, Law, Mechanism,
-    Memory, Parameter, Reported, Residuals, Sign, Speed, Stage, State,
-};
-use crate::number::Number;
-use crate::series::Series;
+use super::prelude::*;
+use super::speed_delay;
 
 /// The wheel-speed channel reports late, relative to the other channels, by a fixed time.
 pub struct WheelSpeedDelay;
 
 impl Describe for WheelSpeedDelay {
-    fn id(&self) -> Id {
-        Id::WheelSpeedDelay
-    }
-    fn stage(&self) -> Stage {
-        Stage::Kinematics
-    }
-    fn through_force(&self) -> bool {
-        false
-    }
-    fn late(&self) -> Option<Speed> {
-        Some(Speed::Wheel)
+    fn facts(&self) -> Facts {
+        Facts {
+            through_force: false,
+            late: Some(Speed::Wheel),
+            ..Facts::of(
+                Id::WheelSpeedDelay,
+                Stage::Kinematics,
+                "measured omega(t) = omega(t - delay)",
+            )
+        }
     }
     fn parameters(&self, context: &Context) -> Vec<Parameter> {
-        parameters(context)
+        speed_delay::parameters(context)
     }
-    fn starts(
-        &self,
-        context: &Context,
-        _series: &[Series],
-        _evidence: &[Residuals],
-    ) -> Vec<Vec<f64>> {
-        starts(context)
-    }
-    fn equation(&self) -> &'static str {
-        "measured omega(t) = omega(t - delay)"
+    fn starts(&self, search: &Search<'_>) -> Vec<Vec<f64>> {
+        speed_delay::starts(search.context)
     }
     fn statement(&self, reported: &[Reported<f64>], _p: &[f64]) -> String {
-        statement("wheel speed", reported[0].value)
+        speed_delay::statement("wheel speed", reported[0].value)
     }
     fn guide(&self) -> Guide {
         Guide {
@@ -73,29 +58,18 @@ impl Describe for WheelSpeedDelay {
             ],
             smallest: "five milliseconds; one where the wheel locks in a tenth of a second",
             smallest_size: |_| 0.005,
-            compensation: Compensation::Not(
-                "all other channels would have to wait for the late one, and the filter keeps no line of them",
-            ),
+            compensation: speed_delay::COMPENSATION,
             carried: "as it is, for the same instrument",
-            example: Example {
-                form: "",
-                parameters: &[0.02],
-            },
+            example: Example::of("", &[0.02]),
         }
     }
 }
 
 impl<T: Number> Mechanism<T> for WheelSpeedDelay {
     fn apply(&self, p: &[T], series: &Series, _context: &Context, state: &mut State<T>) {
-        shift(&mut state.omega, &series.wheel, series, p[0]);
+        speed_delay::shift(&mut state.omega, &series.wheel, series, p[0]);
     }
-    fn report(
-        &self,
-        p: &[T],
-        _law: &Law<T>,
-        _context: &Context,
-        _series: &[Series],
-    ) -> Vec<Reported<T>> {
-        report(p)
+    fn report(&self, p: &[T], _fitted: &Fitted<'_, T>) -> Vec<Reported<T>> {
+        speed_delay::report(p)
     }
 }

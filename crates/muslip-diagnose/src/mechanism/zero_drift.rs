@@ -1,11 +1,6 @@
 //! The drag channel's zero moves with time.
 
-use super::{
-    Balance, Compensation, Context, Describe, Example, Guide, Id, Kind, Law, Mechanism, Memory,
-    Parameter, Reported, Residuals, Sign, Stage, State,
-};
-use crate::number::Number;
-use crate::series::Series;
+use super::prelude::*;
 
 /// How the zero moves, and on which clock.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -44,20 +39,20 @@ pub struct ZeroDrift {
 }
 
 impl Describe for ZeroDrift {
-    fn id(&self) -> Id {
-        Id::ZeroDrift
-    }
-    fn form(&self) -> &'static str {
-        match self.form {
-            Form::Linear => "linear_in_run",
-            Form::LinearOffset => "linear_with_offset",
-            Form::LinearCumulative => "linear_through_runs",
-            Form::WarmUp => "warm_up_in_run",
-            Form::WarmUpCumulative => "warm_up_through_runs",
+    fn facts(&self) -> Facts {
+        let linear = "reading = drag + slope * t";
+        let warm_up = "reading = drag + rise * (1 - exp(-t/time_constant))";
+        let (form, equation) = match self.form {
+            Form::Linear => ("linear_in_run", linear),
+            Form::LinearOffset => ("linear_with_offset", "reading = drag + offset + slope * t"),
+            Form::LinearCumulative => ("linear_through_runs", linear),
+            Form::WarmUp => ("warm_up_in_run", warm_up),
+            Form::WarmUpCumulative => ("warm_up_through_runs", warm_up),
+        };
+        Facts {
+            form,
+            ..Facts::of(Id::ZeroDrift, Stage::Reading, equation)
         }
-    }
-    fn stage(&self) -> Stage {
-        Stage::Reading
     }
     fn parameters(&self, context: &Context) -> Vec<Parameter> {
         let force = context.max_drag.max(10.0 * context.drag_sigma);
@@ -78,26 +73,21 @@ impl Describe for ZeroDrift {
             ],
         }
     }
-    fn starts(
-        &self,
-        context: &Context,
-        _series: &[Series],
-        _evidence: &[Residuals],
-    ) -> Vec<Vec<f64>> {
+    fn starts(&self, search: &Search<'_>) -> Vec<Vec<f64>> {
         let time = if self.form.cumulative() {
-            context.total_time
+            search.context.total_time
         } else {
-            context.duration
+            search.context.duration
         };
         match self.form {
             Form::Linear => vec![vec![0.0]],
-            Form::LinearCumulative if context.runs > 1 => vec![vec![0.0]],
+            Form::LinearCumulative if search.context.runs > 1 => vec![vec![0.0]],
             Form::LinearOffset => vec![vec![0.0, 0.0]],
             Form::WarmUp => [0.06, 0.2, 0.7]
                 .iter()
                 .map(|share| vec![0.0, share * time])
                 .collect(),
-            Form::WarmUpCumulative if context.runs > 1 => [0.1, 0.4]
+            Form::WarmUpCumulative if search.context.runs > 1 => [0.1, 0.4]
                 .iter()
                 .map(|share| vec![0.0, share * time])
                 .collect(),
@@ -106,15 +96,6 @@ impl Describe for ZeroDrift {
     }
     fn by_order(&self, context: &Context) -> bool {
         self.form.cumulative() && !context.clock_continues
-    }
-    fn equation(&self) -> &'static str {
-        match self.form {
-            Form::Linear | Form::LinearCumulative => "reading = drag + slope * t",
-            Form::LinearOffset => "reading = drag + offset + slope * t",
-            Form::WarmUp | Form::WarmUpCumulative => {
-                "reading = drag + rise * (1 - exp(-t/time_constant))"
-            }
-        }
     }
     fn statement(&self, reported: &[Reported<f64>], p: &[f64]) -> String {
         if reported[0].name == "slope" {
@@ -141,10 +122,7 @@ impl Describe for ZeroDrift {
             smallest_size: |c| c.drag_sigma,
             compensation: Compensation::By("takes the zero at the sample's time off the drag"),
             carried: "by the clock: of each run, or of the whole campaign where it goes on through all runs; there a run without the campaign's clock is predicted without it",
-            example: Example {
-                form: "linear_in_run",
-                parameters: &[60.0],
-            },
+            example: Example::of("linear_in_run", &[60.0]),
         }
     }
 }
@@ -169,31 +147,13 @@ impl<T: Number> Mechanism<T> for ZeroDrift {
             };
         }
     }
-    fn report(
-        &self,
-        p: &[T],
-        _law: &Law<T>,
-        _context: &Context,
-        _series: &[Series],
-    ) -> Vec<Reported<T>> {
+    fn report(&self, p: &[T], _fitted: &Fitted<'_, T>) -> Vec<Reported<T>> {
         match self.form {
             Form::WarmUp | Form::WarmUpCumulative => vec![
-                Reported {
-                    name: "time_constant",
-                    unit: "s",
-                    value: p[1],
-                },
-                Reported {
-                    name: "rise",
-                    unit: "N",
-                    value: p[0],
-                },
+                Reported::new("time_constant", "s", p[1]),
+                Reported::new("rise", "N", p[0]),
             ],
-            _ => vec![Reported {
-                name: "slope",
-                unit: "N/s",
-                value: p[0],
-            }],
+            _ => vec![Reported::new("slope", "N/s", p[0])],
         }
     }
 }

@@ -1,0 +1,244 @@
+//! What a mechanism says of itself and what it does.
+
+use super::prelude::*;
+
+/// Where in the chain from speeds to reading a mechanism acts; stages run in this order.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Stage {
+    /// Wheel speed and radius, before slip is formed.
+    Kinematics,
+    /// The slip that the tyre feels.
+    Slip,
+    /// The shape of the friction law.
+    Law,
+    /// The friction coefficient, by a factor.
+    Friction,
+    /// The force in the contact.
+    Contact,
+    /// What the load cell adds to that force.
+    Reading,
+    /// What the load cell's structure does to the reading.
+    Structure,
+    /// What its filter does.
+    Filter,
+    /// How late its line is.
+    Line,
+    /// Where its input clips.
+    Input,
+    /// Forces on the vehicle.
+    Vehicle,
+    /// Torques on the wheel.
+    Wheel,
+}
+
+/// A speed that may be late.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Speed {
+    /// Wheel speed.
+    Wheel,
+    /// Vehicle speed.
+    Vehicle,
+}
+
+/// What the picture of an effect on wheel or vehicle is drawn over.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Against {
+    /// Time in s: the effect has a memory.
+    Time,
+    /// Vehicle speed in m/s.
+    VehicleSpeed,
+    /// Wheel speed in rad/s.
+    WheelSpeed,
+    /// Normal force in N.
+    NormalForce,
+    /// Drag reading in N.
+    Drag,
+    /// Vehicle acceleration in m/s².
+    VehicleAcceleration,
+    /// Wheel acceleration in rad/s².
+    WheelAcceleration,
+}
+
+/// A parameter of a mechanism: bounds of what is physically plausible.
+#[derive(Clone, Debug)]
+pub struct Parameter {
+    /// Name, as in `model.toml`.
+    pub name: String,
+    /// Unit in ASCII.
+    pub unit: &'static str,
+    /// Smallest plausible value.
+    pub low: f64,
+    /// Largest plausible value.
+    pub high: f64,
+}
+
+impl Parameter {
+    /// A parameter with its unit and bounds.
+    #[must_use]
+    pub fn new(name: &str, unit: &'static str, low: f64, high: f64) -> Self {
+        Self {
+            name: name.to_owned(),
+            unit,
+            low,
+            high,
+        }
+    }
+}
+
+/// A figure of the result, by the contract's definition.
+#[derive(Clone, Debug)]
+pub struct Reported<T> {
+    /// Name by the contract.
+    pub name: &'static str,
+    /// Unit in ASCII.
+    pub unit: &'static str,
+    /// Value.
+    pub value: T,
+}
+
+impl<T> Reported<T> {
+    /// A figure with its unit.
+    #[must_use]
+    pub fn new(name: &'static str, unit: &'static str, value: T) -> Self {
+        Self { name, unit, value }
+    }
+}
+
+/// What the base model leaves over on one run: a search can look at it to find where to start.
+#[derive(Clone, Debug, Default)]
+pub struct Residuals {
+    /// Reading predicted by the model so far in N.
+    pub predicted: Vec<f64>,
+    /// Measured minus predicted in N.
+    pub residual: Vec<f64>,
+    /// Inverse noise variance in 1/N² (zero where the sample is not used).
+    pub weight: Vec<f64>,
+}
+
+/// What a search for a mechanism's parameters can go by.
+#[derive(Clone, Copy, Debug)]
+pub struct Search<'a> {
+    /// What is common to all runs.
+    pub context: &'a Context,
+    /// The runs.
+    pub series: &'a [Series],
+    /// What the base model leaves over on each of them.
+    pub residuals: &'a [Residuals],
+}
+
+/// What a mechanism's figures are formed with, beside its own parameters.
+#[derive(Clone, Copy, Debug)]
+pub struct Fitted<'a, T> {
+    /// The base curve that was fitted along with it.
+    pub law: &'a Law<T>,
+    /// What is common to all runs.
+    pub context: &'a Context,
+    /// The runs that it was fitted to.
+    pub series: &'a [Series],
+}
+
+/// What is the same for a form of a mechanism in every campaign.
+#[derive(Clone, Copy, Debug)]
+pub struct Facts {
+    /// Its id in the vocabulary.
+    pub id: Id,
+    /// Which of its forms this is; empty where there is one only.
+    pub form: &'static str,
+    /// Where it acts.
+    pub stage: Stage,
+    /// A second stage that it acts at: a scale of the drag is wrong on vehicle and wheel alike.
+    pub acts_also_at: Option<Stage>,
+    /// Its equation.
+    pub equation: &'static str,
+    /// Whether it works through the force that is predicted, and not on the speeds or on another balance.
+    pub through_force: bool,
+    /// Channel of a recording that shows it.
+    pub channel: &'static str,
+    /// The speed whose lateness it is: found by the timing of the channels, not among the other mechanisms.
+    pub late: Option<Speed>,
+    /// What the picture of its effect is drawn over, where wheel or vehicle lack it.
+    pub drawn_over: Against,
+    /// Which parameter is its size, where one is: at its null the mechanism is absent.
+    pub amplitude: Option<usize>,
+    /// Whether it is rare beside what recordings hardly tell it from.
+    pub rare: bool,
+}
+
+impl Facts {
+    /// What every mechanism must say; the rest as it is for most, by the balance that the mechanism breaks.
+    #[must_use]
+    pub fn of(id: Id, stage: Stage, equation: &'static str) -> Self {
+        let balance = id.balance();
+        Self {
+            id,
+            form: "",
+            stage,
+            acts_also_at: None,
+            equation,
+            through_force: balance == Balance::Tyre,
+            channel: balance.channel(),
+            late: None,
+            drawn_over: Against::Time,
+            amplitude: Some(0),
+            rare: false,
+        }
+    }
+}
+
+/// What a mechanism says of itself.
+pub trait Describe: Send + Sync {
+    /// What is the same in every campaign.
+    fn facts(&self) -> Facts;
+    /// Its id in the vocabulary.
+    fn id(&self) -> Id {
+        self.facts().id
+    }
+    /// Which of its forms this is; empty where there is one only.
+    fn form(&self) -> &'static str {
+        self.facts().form
+    }
+    /// Where it acts first.
+    fn stage(&self) -> Stage {
+        self.facts().stage
+    }
+    /// Whether it acts at this stage.
+    fn acts_at(&self, stage: Stage) -> bool {
+        let facts = self.facts();
+        facts.stage == stage || facts.acts_also_at == Some(stage)
+    }
+    /// Its equation.
+    fn equation(&self) -> &'static str {
+        self.facts().equation
+    }
+    /// Its parameters for this campaign.
+    fn parameters(&self, context: &Context) -> Vec<Parameter>;
+    /// Where a search for its parameters may start: by default where nothing is there of it.
+    fn starts(&self, search: &Search<'_>) -> Vec<Vec<f64>> {
+        vec![vec![0.0; self.parameters(search.context).len()]]
+    }
+    /// One sentence for an engineer, with the figure and its unit.
+    fn statement(&self, reported: &[Reported<f64>], parameters: &[f64]) -> String;
+    /// Its section of the field guide, the same for all its forms.
+    fn guide(&self) -> Guide;
+    /// How long it remembers with these parameters, in s, where it has a memory: one that the measuring chain has, too.
+    fn memory_s(&self, _parameters: &[f64], _context: &Context) -> Option<f64> {
+        None
+    }
+    /// Whether these parameters are its own, and not at a limit where its form is another's.
+    fn owns(&self, _parameters: &[f64]) -> bool {
+        true
+    }
+    /// Whether it goes by the order of the campaign's runs: a recording whose place in it is not known is predicted
+    /// without it.
+    fn by_order(&self, _context: &Context) -> bool {
+        false
+    }
+}
+
+/// What a mechanism does, in plain or dual numbers.
+pub trait Mechanism<T: Number>: Describe {
+    /// Changes the state of one run.
+    fn apply(&self, p: &[T], series: &Series, context: &Context, state: &mut State<T>);
+    /// The contract's figures from the parameters.
+    fn report(&self, p: &[T], fitted: &Fitted<'_, T>) -> Vec<Reported<T>>;
+}

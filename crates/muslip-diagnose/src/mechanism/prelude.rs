@@ -1,0 +1,13 @@
+//! What the file of a mechanism is written with.
+
+pub use super::describe::{
+    Against, Describe, Facts, Fitted, Mechanism, Parameter, Reported, Residuals, Search, Speed,
+    Stage,
+};
+pub use super::guide::{Alias, Compensation, Example, Guide, Kind, Memory, Sign, runs};
+pub use super::id::Id;
+pub use super::state::{Law, State};
+pub use crate::balance::Balance;
+pub use crate::context::Context;
+pub use crate::number::Number;
+pub use crate::series::Series;
