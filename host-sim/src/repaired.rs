@@ -278,18 +278,8 @@ impl<'a> Coupling<'a> {
             tyre,
             dynamics,
             data: Data {
-                rig: repaired.rig.clone(),
-                series: vec![series],
-                context: repaired.context.clone(),
-                extra_names: Vec::new(),
-                faults: Vec::new(),
-                averaged: 1,
-                blocks: Vec::new(),
-                timing_std: Default::default(),
-                vehicle_late: 0.0,
-                vehicle_colour: None,
-                vehicle_filtered: false,
                 catalogue: Arc::new(catalogue),
+                ..Data::of(&repaired.rig, vec![series], repaired.context.clone())
             },
             repaired,
         })

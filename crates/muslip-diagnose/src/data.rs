@@ -198,11 +198,21 @@ impl Data {
             faults.extend(series.iter_mut().map(silenced));
         }
         Self {
+            extra_names: extra_names.to_vec(),
+            faults,
+            ..Self::of(rig, series, context)
+        }
+    }
+
+    /// Runs that are prepared already, of which nothing more is known.
+    #[must_use]
+    pub fn of(rig: &Rig, series: Vec<Series>, context: Context) -> Self {
+        Self {
             rig: rig.clone(),
             series,
             context,
-            extra_names: extra_names.to_vec(),
-            faults,
+            extra_names: Vec::new(),
+            faults: Vec::new(),
             averaged: 1,
             blocks: Vec::new(),
             timing_std: TimingStd::default(),

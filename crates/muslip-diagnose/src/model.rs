@@ -2,6 +2,7 @@
 
 use crate::data::{Catalogue, Listed};
 use crate::mechanism::{Context, Law, Stage, State};
+use crate::number::Number;
 use crate::series::Series;
 
 /// Parameters that every tyre model has: logarithms of peak friction and slip at the peak, and three
@@ -216,6 +217,27 @@ pub fn tyre<T: Listed>(
     state
 }
 
+/// Imbalance of what has this inertia and speed: inertia Δspeed/Δt + the mean over the step of what opposes it.
+fn imbalance<T: Number>(
+    inertia: f64,
+    speed: &[f64],
+    dt: &[f64],
+    opposing: impl Fn(usize) -> T,
+) -> Vec<T> {
+    let mut before = T::constant(0.0);
+    (0..speed.len())
+        .map(|k| {
+            let now = opposing(k);
+            let mean = (now + before) * 0.5;
+            before = now;
+            if k == 0 {
+                return T::constant(0.0);
+            }
+            mean + inertia * ((speed[k] - speed[k - 1]) / dt[k])
+        })
+        .collect()
+}
+
 /// Imbalance of the wheel, one value a step ending at each sample:
 /// J Δω/Δt − R drag + brake torque + what the terms add, in N m, with `chain` (reading minus contact
 /// force, from the tyre model) taken off the drag reading.
@@ -251,17 +273,7 @@ pub fn wheel<T: Listed>(
             + brake
             + state.opposing[k]
     };
-    let mut out = vec![T::constant(0.0); n];
-    let mut before = T::constant(0.0);
-    for (k, imbalance) in out.iter_mut().enumerate() {
-        let now = opposing(k);
-        if k > 0 {
-            let acceleration = (series.wheel.raw[k] - series.wheel.raw[k - 1]) / series.dt[k];
-            *imbalance = (now + before) * 0.5 + context.inertia * acceleration;
-        }
-        before = now;
-    }
-    out
+    imbalance(context.inertia, &series.wheel.raw, &series.dt, opposing)
 }
 
 /// Imbalance of the vehicle, one value a step: m Δv/Δt + drag + what the terms add, in N.
@@ -293,15 +305,5 @@ pub fn vehicle<T: Listed>(
             + (series.drag[k] - chain)
             + state.opposing[k]
     };
-    let mut out = vec![T::constant(0.0); n];
-    let mut before = T::constant(0.0);
-    for (k, imbalance) in out.iter_mut().enumerate() {
-        let now = force(k);
-        if k > 0 {
-            let acceleration = (series.speed.raw[k] - series.speed.raw[k - 1]) / series.dt[k];
-            *imbalance = (now + before) * 0.5 + context.mass * acceleration;
-        }
-        before = now;
-    }
-    out
+    imbalance(context.mass, &series.speed.raw, &series.dt, force)
 }

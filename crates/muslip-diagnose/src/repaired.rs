@@ -1,7 +1,6 @@
 //! The repaired model as plain data: what `model.toml` holds, and how it predicts a recording.
 
 use std::collections::BTreeMap;
-use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
 
@@ -403,18 +402,8 @@ impl Repaired {
     /// A campaign of one run under this model.
     pub(crate) fn data_of(&self, series: Series, extra_names: Vec<String>) -> Data {
         Data {
-            rig: self.rig.clone(),
-            series: vec![series],
-            context: self.context.clone(),
             extra_names,
-            faults: Vec::new(),
-            averaged: 1,
-            blocks: Vec::new(),
-            timing_std: Default::default(),
-            vehicle_late: 0.0,
-            vehicle_colour: None,
-            vehicle_filtered: false,
-            catalogue: Arc::default(),
+            ..Data::of(&self.rig, vec![series], self.context.clone())
         }
     }
 

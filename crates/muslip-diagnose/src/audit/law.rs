@@ -6,7 +6,7 @@ use super::constants::{
 use super::finding::Timing;
 use super::recording::{Block, Recording, blocks, spans};
 use super::signal::{Signal, low_pass};
-use super::squares::{Balance, Solution, colour_of, refine};
+use super::squares::{Balance, Solution, recoloured, refine};
 use super::vehicle::{constants_of, impulse_like, powers};
 use crate::campaign::Rig;
 
@@ -231,23 +231,9 @@ pub fn law(rig: &Rig, runs: &[Recording], vehicle: Timing, moment: f64) -> Optio
     balance.blocks = even(step);
     let begun = start[WHEEL];
     let known = vehicle.std.is_finite();
-    let mut at = refine(
-        &balance,
-        &start,
-        &[0.6],
-        3,
-        &[false, false, false, false, known, true],
-    )?;
-    for _ in 0..3 {
-        let colour = colour_of(&balance, &at.unknowns);
-        at = refine(
-            &balance,
-            &at.unknowns,
-            &colour,
-            4,
-            &[false, false, false, false, known, true],
-        )?;
-    }
+    let fixed = [false, false, false, false, known, true];
+    let at = refine(&balance, &start, &[0.6], 3, &fixed)?;
+    let at = recoloured(&balance, at, &fixed)?;
     ((at.unknowns[WHEEL] - begun).abs() < ASTRAY_S).then_some(at)
 }
 

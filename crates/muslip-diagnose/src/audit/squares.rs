@@ -184,6 +184,17 @@ pub fn colour_of(balance: &impl Balance, unknowns: &[f64]) -> Vec<f64> {
     autoregression(&rest(balance, unknowns), WHITENING_ORDER)
 }
 
+/// An estimate refined on, its whitening filter made anew of what it leaves each time.
+#[must_use]
+pub fn recoloured(balance: &impl Balance, found: Solution, fixed: &[bool]) -> Option<Solution> {
+    let mut at = found;
+    for _ in 0..3 {
+        let colour = colour_of(balance, &at.unknowns);
+        at = refine(balance, &at.unknowns, &colour, 4, fixed)?;
+    }
+    Some(at)
+}
+
 /// Gauss-Newton passes at a fixed whitening filter; those unknowns that are `fixed` stay.
 #[must_use]
 pub fn refine(

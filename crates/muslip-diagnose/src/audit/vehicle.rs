@@ -5,7 +5,7 @@ use super::constants::{
 };
 use super::recording::{Block, Recording, blocks, spans};
 use super::signal::low_pass;
-use super::squares::{Balance, Solution, colour_of, refine, rest, scan_value};
+use super::squares::{Balance, Solution, recoloured, refine, rest, scan_value};
 
 /// Unknowns: scale of the drag's impulse, delay in s, and signed square of the time constant by which v is slower, s².
 struct Vehicle<'a> {
@@ -93,10 +93,7 @@ impl Balance for Vehicle<'_> {
     }
 
     fn own(&self, _: &[f64]) -> Vec<Vec<Vec<f64>>> {
-        self.blocks
-            .iter()
-            .map(|block| powers(block.count, 3))
-            .collect()
+        parabolas(&self.blocks)
     }
 
     fn steps(&self) -> Vec<f64> {
@@ -106,6 +103,11 @@ impl Balance for Vehicle<'_> {
     fn prior(&self) -> Vec<(f64, f64)> {
         vec![(1.0, 1.0), (0.0, f64::INFINITY), (0.0, 0.02)]
     }
+}
+
+/// A parabola over each block, as columns.
+pub(super) fn parabolas(blocks: &[Block]) -> Vec<Vec<Vec<f64>>> {
+    blocks.iter().map(|block| powers(block.count, 3)).collect()
 }
 
 /// Powers 0, 1, ... of time over a block, scaled to -1..1.
@@ -159,17 +161,9 @@ pub fn vehicle(runs: &[Recording], mass: f64) -> Option<(Solution, Left)> {
         })
         .min_by(|a, b| a.0.total_cmp(&b.0))?
         .1;
-    let mut at = refine(
-        &balance,
-        &[1.0, best, 0.0],
-        &[0.95],
-        4,
-        &[false, false, true],
-    )?;
-    for _ in 0..3 {
-        let colour = colour_of(&balance, &at.unknowns);
-        at = refine(&balance, &at.unknowns, &colour, 4, &[false; 3])?;
-    }
+    let start = [1.0, best, 0.0];
+    let at = refine(&balance, &start, &[0.95], 4, &[false, false, true])?;
+    let at = recoloured(&balance, at, &[false; 3])?;
     let left = Left {
         residual: rest(&balance, &at.unknowns),
         step,

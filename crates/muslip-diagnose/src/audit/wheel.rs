@@ -6,8 +6,8 @@ use super::constants::{
 use super::finding::Timing;
 use super::recording::{Block, Recording, blocks};
 use super::signal::low_pass;
-use super::squares::{Balance, Solution, colour_of, refine, scan_value};
-use super::vehicle::{constants_of, powers};
+use super::squares::{Balance, Solution, recoloured, refine, scan_value};
+use super::vehicle::{constants_of, parabolas};
 use crate::campaign::Rig;
 
 /// Unknowns: scale of both impulses, the brake's against the drag's, delay of ω and of the brake in s, second moment by which
@@ -93,10 +93,7 @@ impl Balance for Wheel<'_> {
     }
 
     fn own(&self, _: &[f64]) -> Vec<Vec<Vec<f64>>> {
-        self.blocks
-            .iter()
-            .map(|block| powers(block.count, 3))
-            .collect()
+        parabolas(&self.blocks)
     }
 
     fn steps(&self) -> Vec<f64> {
@@ -177,22 +174,7 @@ pub fn wheel(rig: &Rig, runs: &[Recording], known: Timing) -> Option<Solution> {
         })
         .min_by(|a, b| a.0.total_cmp(&b.0))?;
     let start = [1.0, 1.0, best.1, best.2, 0.0];
-    let mut at = refine(
-        &balance,
-        &start,
-        &[0.98],
-        4,
-        &[false, false, false, false, true],
-    )?;
-    for _ in 0..3 {
-        let colour = colour_of(&balance, &at.unknowns);
-        at = refine(
-            &balance,
-            &at.unknowns,
-            &colour,
-            4,
-            &[false, false, false, false, true],
-        )?;
-    }
-    Some(at)
+    let fixed = [false, false, false, false, true];
+    let at = refine(&balance, &start, &[0.98], 4, &fixed)?;
+    recoloured(&balance, at, &fixed)
 }

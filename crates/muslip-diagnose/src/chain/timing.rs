@@ -173,8 +173,8 @@ impl Recorded<'_> {
     /// torque, is to be told apart (delay, lag or what else keeps it back), so the channels are put back by that much.
     fn left_to_physics(
         &self,
-        data: Data,
-        judged: Judged,
+        mut data: Data,
+        mut judged: Judged,
         mut timing: Timing,
         effort: Effort,
     ) -> Option<(Data, Timing, Judged)> {
@@ -185,7 +185,6 @@ impl Recorded<'_> {
         if brake {
             timing.leave_brake();
         }
-        let (mut data, mut judged) = (data, judged);
         if drag.is_some() || brake {
             data = self.at_one_time(timing.late);
             // What is to be explained is not to be explained away: a drag that two others say is late, or a brake.

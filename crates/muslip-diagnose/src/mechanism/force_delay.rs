@@ -34,16 +34,8 @@ impl Describe for ForceDelay {
             memory: Memory::Kernel,
             sign: Sign::Positive,
             aliases: &[
-                Alias {
-                    with: Id::RelaxationLength,
-                    why: "At one speed a distance is a time.",
-                    run: runs::RAMP_SPEEDS,
-                },
-                Alias {
-                    with: Id::SlipHysteresis,
-                    why: "At one rate of slip what comes late opens the same loop.",
-                    run: runs::RAMP_SPEEDS,
-                },
+                late::AT_ONE_SPEED,
+                late::AT_ONE_RATE,
                 Alias {
                     with: Id::ForceLag,
                     why: "A short filter delays slow features by its time constant.",
@@ -54,11 +46,7 @@ impl Describe for ForceDelay {
                     why: "Far below its frequency a resonance is a delay of 2 zeta/W.",
                     run: runs::TAP_IMPULSE,
                 },
-                Alias {
-                    with: Id::InertialReaction,
-                    why: "When the wheel slows before the force falls, its acceleration looks like the force's past.",
-                    run: runs::STOP_LIFTED,
-                },
+                late::AS_THE_WHEEL_SLOWS,
             ],
             smallest: "five milliseconds, less where slip moves fast",
             smallest_size: |_| 0.005,
