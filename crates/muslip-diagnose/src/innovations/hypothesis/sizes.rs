@@ -1,0 +1,120 @@
+//! Sizes of the noise, fitted balance by balance.
+
+use nalgebra::DMatrix;
+
+use crate::data::Data;
+use crate::innovations::candidates::Table;
+use crate::innovations::estimate::{self, Readings};
+use crate::innovations::gram::{Columns, grams, total};
+use crate::innovations::noise::BalanceParts;
+use crate::innovations::screen::precision;
+use crate::mechanism::Balance;
+
+/// How much work a judgement may be.
+#[derive(Clone, Copy)]
+pub struct Effort {
+    /// Steps towards the best parameters.
+    pub steps: usize,
+    /// Steps towards the best sizes of the noise.
+    pub noise_steps: usize,
+    /// Every so many blocks are read for the sizes of the noise.
+    pub noise_stride: usize,
+}
+
+/// Blocks of one balance that are enough for the sizes of its noise.
+const ENOUGH_BLOCKS: usize = 6000;
+
+/// Every so many blocks are enough for the sizes of the noise.
+#[must_use]
+pub fn noise_stride(data: &Data) -> usize {
+    let count = |balance: usize| {
+        let blocks = data.blocks.iter().map(|b| b[balance].time.len());
+        blocks.sum::<usize>()
+    };
+    let most = (0..3).map(count).max().unwrap_or(0);
+    most.div_ceil(ENOUGH_BLOCKS).max(1)
+}
+
+/// The noise with every part at most as large as the sensors make plausible.
+#[must_use]
+pub fn capped(parts: &[BalanceParts]) -> Vec<BalanceParts> {
+    let mut all = parts.to_vec();
+    for source in all.iter_mut().flat_map(|p| &mut p.sources) {
+        source.log_std = source.log_std.min(source.log_cap);
+    }
+    all
+}
+
+/// Sizes of the noise carried over to gains taken about another model.
+pub fn with_sizes(mut fresh: Vec<BalanceParts>, old: &[BalanceParts]) -> Vec<BalanceParts> {
+    for (new, old) in fresh.iter_mut().zip(old) {
+        for (new, old) in new.sources.iter_mut().zip(&old.sources) {
+            new.log_std = old.log_std;
+        }
+    }
+    fresh
+}
+
+/// How often the noise of every balance is fitted in turn where nothing is known of any.
+pub const SWEEPS: usize = 2;
+
+/// Fits the noise of one balance after the other, by the likelihood of all: they share the coefficients. `carried` is
+/// whether it was fitted to another model.
+pub fn fit_in_turn(
+    data: &Data,
+    table: &Table,
+    noise: &mut [BalanceParts],
+    touched: &dyn Fn(Balance) -> bool,
+    carried: bool,
+    effort: Effort,
+) {
+    let prior = |i: usize| precision(table, i);
+    let own = |part: &BalanceParts| {
+        total(&grams(data, part, &table.columns[part.balance as usize], 1)).products
+    };
+    let mut products: Vec<DMatrix<f64>> = noise.iter().map(own).collect();
+    for at in 0..noise.len() {
+        let part = &mut noise[at];
+        if !touched(part.balance) {
+            continue;
+        }
+        let mut others = DMatrix::zeros(products[at].nrows(), products[at].ncols());
+        for (_, own) in products.iter().enumerate().filter(|(i, _)| *i != at) {
+            others += own;
+        }
+        let readings = Readings {
+            data,
+            columns: &table.columns[part.balance as usize],
+            precision: &prior,
+            others: &others,
+            stride: effort.noise_stride,
+        };
+        if carried {
+            fit_from_both(&readings, part, effort.noise_steps);
+        } else {
+            estimate::fit(&readings, part, effort.noise_steps);
+        }
+        products[at] = own(part);
+    }
+}
+
+/// Whether any of these columns is more than nothing in a balance.
+pub fn touches(columns: &[Columns], which: core::ops::Range<usize>) -> bool {
+    columns
+        .iter()
+        .filter(|run| run.len() >= which.end)
+        .any(|run| run[which.clone()].iter().flatten().any(|x| *x != 0.0))
+}
+
+/// Fits the sizes of a balance's noise from what they are and, where they were fitted to another model, from the
+/// sensors' own as well: what swallowed an effect before it was in the model must be let go of.
+fn fit_from_both(readings: &Readings<'_>, part: &mut BalanceParts, steps: usize) {
+    let mut anew = part.clone();
+    let carried_on = estimate::fit(readings, part, steps);
+    for source in &mut anew.sources {
+        source.log_std = source.log_start;
+    }
+    if estimate::fit(readings, &mut anew, steps) < carried_on {
+        *part = anew;
+    }
+}

@@ -1,0 +1,267 @@
+//! Against dense algebra and differences.
+
+use nalgebra::{DMatrix, DVector};
+use rand::RngExt as _;
+use rand::SeedableRng as _;
+use rand_chacha::ChaCha8Rng;
+
+use super::part::APART;
+use super::*;
+
+const WHITE: f64 = 0.7;
+
+/// Irregular times with a gap, and a gain that varies.
+fn times(draw: &mut ChaCha8Rng) -> (Vec<f64>, Vec<f64>) {
+    let mut t = 0.0;
+    let time = (0..80)
+        .map(|k| {
+            t += if k == 45 {
+                0.6
+            } else {
+                draw.random_range(0.004..0.03)
+            };
+            t
+        })
+        .collect();
+    (
+        time,
+        (0..80).map(|_| draw.random_range(-2.0..2.0)).collect(),
+    )
+}
+
+/// Covariance of the readings, built impulse by impulse: every independent cause of noise drives the recursion
+/// alone.
+fn dense(time: &[f64], segments: &[core::ops::Range<usize>], parts: &[Part<'_>]) -> DMatrix<f64> {
+    let used: Vec<usize> = segments.iter().flat_map(Clone::clone).collect();
+    let n = used.len();
+    let mut covariance = DMatrix::identity(n, n) * (WHITE * WHITE);
+    let starts: Vec<usize> = segments.iter().map(|s| s.start).collect();
+    for part in parts {
+        if let Kind::Filtered(tau) = part.kind {
+            // The covariance of white noise behind two poles, in closed form.
+            let (a, b) = (1.0 / (APART * tau), APART / tau);
+            let at = |lag: f64| {
+                (-a * lag).exp() * (0.5 / a - 1.0 / (a + b))
+                    + (-b * lag).exp() * (0.5 / b - 1.0 / (a + b))
+            };
+            covariance += DMatrix::from_fn(n, n, |i, j| {
+                let gain = |i: usize| part.gain.get(used[i]).copied().unwrap_or(1.0);
+                let lag = (time[used[i]] - time[used[j]]).abs();
+                part.std * part.std * gain(i) * gain(j) * at(lag) / at(0.0)
+            });
+        }
+    }
+    let mut add = |effect: &DVector<f64>| covariance += effect * effect.transpose();
+    for part in parts {
+        for cause in 0..n {
+            let mut effect = DVector::zeros(n);
+            let (mut x, mut level) = (0.0, 0.0);
+            for (i, &k) in used.iter().enumerate() {
+                let dt = if i == 0 {
+                    0.0
+                } else {
+                    time[k] - time[used[i - 1]]
+                };
+                let here = if i == cause { 1.0 } else { 0.0 };
+                let first = i == 0;
+                let kept = |tau: f64| (-dt / tau).exp();
+                let driven = |tau: f64| {
+                    let fresh = if first {
+                        1.0
+                    } else {
+                        (1.0 - kept(tau).powi(2)).sqrt()
+                    };
+                    fresh * part.std
+                };
+                match part.kind {
+                    Kind::Forgetting(tau) => {
+                        x = kept(tau) * x + here * driven(tau);
+                    }
+                    Kind::Constant => x += if first { here * part.std } else { 0.0 },
+                    Kind::Walk => {
+                        if starts.contains(&k) {
+                            x = here * (WHITE * WHITE * DIFFUSE).sqrt();
+                        } else {
+                            x += here * part.std * dt.sqrt();
+                        }
+                    }
+                    Kind::Integrated(tau) => {
+                        level += dt * x;
+                        if starts.contains(&k) {
+                            level = 0.0;
+                        }
+                        x = kept(tau) * x + here * driven(tau);
+                    }
+                    Kind::Filtered(_) => {}
+                }
+                let gain = part.gain.get(k).copied().unwrap_or(1.0);
+                effect[i] = if matches!(part.kind, Kind::Integrated(_)) {
+                    level
+                } else {
+                    gain * x
+                };
+            }
+            add(&effect);
+        }
+    }
+    covariance
+}
+
+fn worst_difference(parts: &[Part<'_>], time: &[f64], draw: &mut ChaCha8Rng) -> f64 {
+    let segments = [2..30, 34..45, 45..80];
+    let whitener = Whitener::new(time, &segments, 1, WHITE, WHITE * WHITE * DIFFUSE, parts);
+    let covariance = dense(time, &segments, parts);
+    let factor = covariance.clone().cholesky().unwrap();
+    let columns: Vec<Vec<f64>> = (0..11)
+        .map(|_| (0..80).map(|_| draw.random_range(-1.0..1.0)).collect())
+        .collect();
+    let refs: Vec<&[f64]> = columns.iter().map(Vec::as_slice).collect();
+    let white = whitener.apply(&refs);
+    let mut worst = 0.0f64;
+    for (a, own) in columns.iter().zip(&white) {
+        for (b, other) in columns.iter().zip(&white) {
+            let pick = |x: &[f64]| {
+                DVector::from_iterator(
+                    whitener.samples.len(),
+                    whitener.samples.iter().map(|k| x[*k]),
+                )
+            };
+            let expected = pick(a).dot(&factor.solve(&pick(b)));
+            let found: f64 = own.iter().zip(other).map(|(a, b)| a * b).sum();
+            worst = worst.max((found - expected).abs() / expected.abs().max(1.0));
+        }
+    }
+    let log_det = 2.0 * factor.l().diagonal().iter().map(|d| d.ln()).sum::<f64>();
+    worst.max((whitener.log_variances.iter().sum::<f64>() - log_det).abs() / log_det.abs())
+}
+
+#[test]
+fn the_filter_equals_dense_algebra_with_gaps_and_stretches_left_out() {
+    let mut draw = ChaCha8Rng::seed_from_u64(7);
+    for _ in 0..5 {
+        let (time, gain) = times(&mut draw);
+        let parts = [
+            Part {
+                kind: Kind::Forgetting(0.05),
+                std: 0.8,
+                gain: &gain,
+            },
+            Part {
+                kind: Kind::Constant,
+                std: 1.3,
+                gain: &gain,
+            },
+            Part {
+                kind: Kind::Forgetting(0.4),
+                std: 0.5,
+                gain: &[],
+            },
+            Part {
+                kind: Kind::Filtered(0.06),
+                std: 0.9,
+                gain: &gain,
+            },
+        ];
+        assert!(worst_difference(&parts, &time, &mut draw) < 1e-9);
+    }
+}
+
+#[test]
+fn the_filter_equals_dense_algebra_where_levels_are_unknown() {
+    let mut draw = ChaCha8Rng::seed_from_u64(8);
+    for _ in 0..5 {
+        let (time, gain) = times(&mut draw);
+        let parts = [
+            Part {
+                kind: Kind::Walk,
+                std: 0.6,
+                gain: &[],
+            },
+            Part {
+                kind: Kind::Forgetting(0.05),
+                std: 0.8,
+                gain: &gain,
+            },
+            Part {
+                kind: Kind::Integrated(0.1),
+                std: 2.0,
+                gain: &[],
+            },
+        ];
+        // A variance of 1e8 leaves dense algebra itself six digits.
+        let worst = worst_difference(&parts, &time, &mut draw);
+        assert!(worst < 1e-5, "{worst}");
+    }
+}
+
+#[test]
+fn slopes_of_the_likelihood_are_its_differences() {
+    let mut draw = ChaCha8Rng::seed_from_u64(9);
+    let (time, gain) = times(&mut draw);
+    let columns: Vec<Vec<f64>> = (0..11)
+        .map(|_| (0..80).map(|_| draw.random_range(-3.0..3.0)).collect())
+        .collect();
+    let refs: Vec<&[f64]> = columns.iter().map(Vec::as_slice).collect();
+    let segments = [2..30, 34..45, 45..80];
+    let parts = |variances: &[f64]| {
+        let kinds = [
+            Kind::Walk,
+            Kind::Forgetting(0.05),
+            Kind::Integrated(0.1),
+            Kind::Constant,
+            Kind::Integrated(0.7),
+            Kind::Filtered(0.06),
+        ];
+        let gained = [false, true, false, true, false, true];
+        kinds
+            .into_iter()
+            .zip(gained)
+            .zip(variances)
+            .map(|((kind, gained), variance)| Part {
+                kind,
+                std: variance.sqrt(),
+                gain: if gained { &gain } else { &[] },
+            })
+            .collect::<Vec<_>>()
+    };
+    let filter = |variances: &[f64; 7]| {
+        Whitener::new(
+            &time,
+            &segments,
+            1,
+            variances[6].sqrt(),
+            1e6,
+            &parts(&variances[..6]),
+        )
+    };
+    let value = |variances: &[f64; 7]| {
+        let whitener = filter(variances);
+        let squares: f64 = whitener.apply(&refs).iter().flatten().map(|x| x * x).sum();
+        whitener.log_variances.iter().sum::<f64>() + squares
+    };
+    let here = [0.4, 0.6, 2.0, 1.2, 0.8, 0.7, 0.5];
+    let whitener = filter(&here);
+    let traces = whitener.traces(&parts(&here[..6]));
+    let white = whitener.apply(&refs);
+    let white: Vec<&[f64]> = white.iter().map(Vec::as_slice).collect();
+    let squares = whitener.squares(&white, &parts(&here[..6]));
+    for i in 0..7 {
+        let own = if i == 6 {
+            traces.white - squares.white
+        } else {
+            traces.parts[i] - squares.parts[i]
+        };
+        let by = |h: f64| {
+            let mut there = here;
+            there[i] += h;
+            value(&there)
+        };
+        // The level's variance of 1e6 leaves the value ten digits: smaller steps measure its rounding.
+        let h = 5e-4 * here[i];
+        let difference = (by(h) - by(-h)) / (2.0 * h);
+        assert!(
+            (own - difference).abs() < 1e-4 * difference.abs().max(1.0),
+            "{i}: {own} {difference}"
+        );
+    }
+}
