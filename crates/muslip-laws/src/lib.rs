@@ -53,14 +53,7 @@
 #![forbid(unsafe_code)]
 #![cfg_attr(
     not(test),
-    deny(
-        clippy::indexing_slicing,
-        clippy::float_cmp,
-        clippy::cast_possible_truncation,
-        clippy::cast_possible_wrap,
-        clippy::cast_precision_loss,
-        clippy::cast_sign_loss
-    )
+    deny(clippy::as_conversions, clippy::float_cmp, clippy::indexing_slicing)
 )]
 
 pub mod burckhardt;
