@@ -229,17 +229,11 @@ impl<T: Real, const N: usize> Compensator<T, N> {
         dt_s: T,
         state: &State<T>,
     ) -> Result<Compensated<T>, StepError> {
-        let RigSample {
-            wheel_speed_rad_s: omega,
-            vehicle_speed_m_s: v,
-            drag_force_n: reading,
-            normal_force_n: fz,
-        } = *sample;
         for (value, channel) in [
-            (omega, Channel::WheelSpeed),
-            (v, Channel::VehicleSpeed),
-            (reading, Channel::DragForce),
-            (fz, Channel::NormalForce),
+            (sample.wheel_speed_rad_s, Channel::WheelSpeed),
+            (sample.vehicle_speed_m_s, Channel::VehicleSpeed),
+            (sample.drag_force_n, Channel::DragForce),
+            (sample.normal_force_n, Channel::NormalForce),
         ] {
             if !value.is_finite() {
                 return Err(StepError::NonFinite { channel });
@@ -270,7 +264,11 @@ impl<T: Real, const N: usize> Compensator<T, N> {
 
         let delay_s = self.delay_s();
         let planned = if delay_s > T::ZERO {
-            let inputs = [omega, v, fz];
+            let inputs = [
+                sample.wheel_speed_rad_s,
+                sample.vehicle_speed_m_s,
+                sample.normal_force_n,
+            ];
             let planned = self.line.plan(delay_s, dt_s, inputs, gap);
             Some(planned.ok_or(StepError::DelayDoesNotFit)?)
         } else {
@@ -282,8 +280,8 @@ impl<T: Real, const N: usize> Compensator<T, N> {
                 let when_read = RigSample {
                     wheel_speed_rad_s: omega,
                     vehicle_speed_m_s: v,
-                    drag_force_n: reading,
                     normal_force_n: fz,
+                    ..*sample
                 };
                 self.measured(&when_read, state, &mut memory)?
             }

@@ -590,26 +590,27 @@ fn derivatives_behind_the_filters_are_those_of_the_expected_reading() {
         let (up, down) = (at(mup + d, sp), at(mup - d, sp));
         let (right, left) = (at(mup, sp + d), at(mup, sp - d));
         let close = Tolerance::relative(1e-5);
-        let slope = |a: f64, b: f64| (a - b) / (2.0 * d);
-        close.check(
-            "by mup",
-            here.by_peak_friction,
-            slope(up.friction, down.friction),
-        );
-        close.check(
+        let check = |what: &str, found: f64, more: f64, less: f64| {
+            close.check(what, found, (more - less) / (2.0 * d));
+        };
+        check("by mup", here.by_peak_friction, up.friction, down.friction);
+        check(
             "by sp",
             here.by_critical_slip,
-            slope(right.friction, left.friction),
+            right.friction,
+            left.friction,
         );
-        close.check(
+        check(
             "by both",
             here.by_both,
-            slope(right.by_peak_friction, left.by_peak_friction),
+            right.by_peak_friction,
+            left.by_peak_friction,
         );
-        close.check(
+        check(
             "by sp twice",
             here.by_critical_slip_twice,
-            slope(right.by_critical_slip, left.by_critical_slip),
+            right.by_critical_slip,
+            left.by_critical_slip,
         );
     }
 }

@@ -3,8 +3,6 @@
 #![allow(
     clippy::unwrap_used,
     clippy::panic,
-    clippy::cast_possible_truncation,
-    clippy::cast_precision_loss,
     reason = "a failed step fails the test"
 )]
 

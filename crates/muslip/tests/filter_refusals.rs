@@ -6,6 +6,7 @@ use muslip::filter::mu_slip::{
     update_reporting,
 };
 use muslip::filter::{Estimator, FrictionMeasurement};
+use muslip::real::Real;
 
 const BAD: [f32; 3] = [f32::NAN, f32::INFINITY, f32::NEG_INFINITY];
 
@@ -124,18 +125,24 @@ fn a_prior_that_is_not_positive_definite_is_refused() {
     }
 }
 
+/// An estimate whose peak is uncertain and whose slip is not.
+fn sharp<T: Real>() -> (State<T>, Covariance<T>) {
+    let x = State {
+        peak_friction: T::from_f64(0.6),
+        critical_slip: T::from_f64(0.2),
+    };
+    let p = Covariance {
+        p00: T::from_f64(0.36),
+        p01: T::ZERO,
+        p11: T::from_f64(1e-10),
+    };
+    (x, p)
+}
+
 #[test]
 fn a_measurement_too_certain_for_the_precision_is_refused_and_not_clamped() {
     // At the peak H = (1, 0): the posterior variance of peak friction is the noise, 1e-16 of the prior's.
-    let x = State {
-        peak_friction: 0.6,
-        critical_slip: 0.2,
-    };
-    let p = Covariance {
-        p00: 0.36,
-        p01: 0.0,
-        p11: 1e-10,
-    };
+    let (x, p) = sharp::<f32>();
     assert_eq!(
         refusal(x, p, 0.2, 0.5, 1e-17),
         UpdateError::PosteriorNotPositiveDefinite
@@ -168,16 +175,8 @@ fn a_measurement_too_certain_for_the_precision_is_refused_and_not_clamped() {
     }
     assert!(refused > 50, "{refused}");
     // Double precision can hold what single precision cannot.
-    let x = State {
-        peak_friction: 0.6,
-        critical_slip: 0.2,
-    };
-    let p = Covariance {
-        p00: 0.36,
-        p01: 0.0,
-        p11: 1e-10,
-    };
-    assert!(update_reporting(x, p, 0.2, 0.5, 1e-13_f64).is_ok());
+    let (x, p) = sharp::<f64>();
+    assert!(update_reporting(x, p, 0.2, 0.5, 1e-13).is_ok());
 }
 
 #[test]

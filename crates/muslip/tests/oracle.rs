@@ -98,11 +98,9 @@ impl Case {
     fn random(noise: &mut Noise) -> Self {
         let single = |v: f64| f64::from(v as f32);
         let (mup, sp) = (noise.uniform(0.05, 1.2), noise.uniform(0.03, 0.4));
-        let (std0, std1) = (noise.log_uniform(1e-3, 1.0), noise.log_uniform(1e-3, 0.4));
-        let correlation = noise.uniform(-0.99, 0.99);
         Self {
             state: [mup, sp].map(single),
-            covariance: [std0 * std0, correlation * std0 * std1, std1 * std1].map(single),
+            covariance: noise.covariance().map(single),
             slip: single(noise.uniform(-0.05, 1.05)),
             friction: single(noise.uniform(-0.2, 1.4)),
             variance: single(noise.log_uniform(1e-3, 0.5).powi(2)),

@@ -18,12 +18,11 @@ struct Case {
 
 impl Case {
     fn random(noise: &mut Noise, smallest_std: f64, largest_std: f64) -> Self {
-        let (std0, std1) = (noise.log_uniform(1e-3, 1.0), noise.log_uniform(1e-3, 0.4));
-        let correlation = noise.uniform(-0.99, 0.99);
         let single = |v: f64| v as f32;
+        let covariance = noise.covariance().map(single);
         Self {
             state: [noise.uniform(0.05, 1.2), noise.uniform(0.03, 0.4)].map(single),
-            covariance: [std0 * std0, correlation * std0 * std1, std1 * std1].map(single),
+            covariance,
             slip: noise.uniform(0.0, 1.0) as f32,
             friction: noise.uniform(0.0, 1.2) as f32,
             std: noise.log_uniform(smallest_std, largest_std) as f32,

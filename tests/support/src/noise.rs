@@ -33,6 +33,13 @@ impl Noise {
     pub fn log_uniform(&mut self, low: f64, high: f64) -> f64 {
         self.uniform(low.ln(), high.ln()).exp()
     }
+
+    /// A prior covariance of peak friction and critical slip: its p00, p01 and p11.
+    pub fn covariance(&mut self) -> [f64; 3] {
+        let (std0, std1) = (self.log_uniform(1e-3, 1.0), self.log_uniform(1e-3, 0.4));
+        let correlation = self.uniform(-0.99, 0.99);
+        [std0 * std0, correlation * std0 * std1, std1 * std1]
+    }
 }
 
 #[cfg(test)]
