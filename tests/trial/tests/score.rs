@@ -161,7 +161,11 @@ fi
 }
 
 fn judged(directory: &Path, knowing: bool) -> Report {
-    score(&ScoreRequest {
+    score(&request(directory, knowing)).unwrap()
+}
+
+fn request(directory: &Path, knowing: bool) -> ScoreRequest {
+    ScoreRequest {
         tool: tool(directory, knowing),
         campaigns: PathBuf::from(directory),
         results: directory.join(if knowing {
@@ -175,8 +179,7 @@ fn judged(directory: &Path, knowing: bool) -> Report {
         jobs: 2,
         reuse: false,
         every: 1,
-    })
-    .unwrap()
+    }
 }
 
 #[test]
@@ -213,19 +216,9 @@ fn a_broken_seal_is_noticed() {
     let truth = directory.path().join("sealed/campaign-0000/truth.json");
     let text = fs::read_to_string(&truth).unwrap();
     fs::write(&truth, text + " ").unwrap();
-    let request = ScoreRequest {
-        tool: tool(directory.path(), false),
-        campaigns: directory.path().into(),
-        results: directory.path().join("answers"),
-        strata: vec![],
-        only: None,
-        baselines: false,
-        jobs: 2,
-        reuse: false,
-        every: 1,
-    };
+    let refused = score(&request(directory.path(), false));
     assert!(
-        score(&request)
+        refused
             .unwrap_err()
             .to_string()
             .contains("not what was sealed")

@@ -245,6 +245,20 @@ mod tests {
         }
     }
 
+    /// The same run without and with the effect, and as often with errors.
+    fn shown<'a>(
+        plain: &'a Readings,
+        nudged: &'a Readings,
+        erring: &'a [Readings],
+    ) -> Vec<Shown<'a>> {
+        let run = |erring| Shown {
+            plain,
+            nudged,
+            erring,
+        };
+        erring.iter().map(run).collect()
+    }
+
     #[test]
     fn a_grade_is_as_sharp_as_the_slope_of_a_straight_line() {
         let mut draw = Draw::new(1, &[9]);
@@ -271,14 +285,7 @@ mod tests {
                 coasting(&rig, 50.0, || 0.02 * draw.borrow_mut().normal())
             })
             .collect();
-        let runs: Vec<Shown<'_>> = erring
-            .iter()
-            .map(|erring| Shown {
-                plain: &plain,
-                nudged: &nudged,
-                erring,
-            })
-            .collect();
+        let runs = shown(&plain, &nudged, &erring);
         let std = attainable_std("vehicle", &rig, base, &runs, false);
         // Variance of a slope through n points at spacing dt: 12 sigma² / (dt² n³); the step is 1 N.
         let slope = (12.0 * 0.02f64.powi(2) / (0.01f64.powi(2) * 1000f64.powi(3)) / 30.0).sqrt();
@@ -316,18 +323,10 @@ mod tests {
                 run(0.0, &|| 50.0 * draw.borrow_mut().normal())
             })
             .collect();
-        let shown = |erring: &'_ [Readings]| -> f64 {
-            let runs: Vec<Shown<'_>> = erring
-                .iter()
-                .map(|erring| Shown {
-                    plain: &plain,
-                    nudged: &nudged,
-                    erring,
-                })
-                .collect();
-            attainable_std("tyre", &rig, base, &runs, false)
+        let std = |erring: &[Readings]| {
+            attainable_std("tyre", &rig, base, &shown(&plain, &nudged, erring), false)
         };
-        let (all, half) = (shown(&erring), shown(&erring[..20]));
+        let (all, half) = (std(&erring), std(&erring[..20]));
         assert!((half / all / 2f64.sqrt() - 1.0).abs() < 0.15, "{half} {all}");
         // A lower bound without the two parameters: sigma over the root of the sum of squares.
         let squares: f64 = (0..plain.time.len())

@@ -7,7 +7,7 @@ use crate::draw::Draw;
 use crate::generate::attainable::{Shown, attainable_std};
 use crate::generate::chain::{Chain, Readings};
 use crate::generate::effect::{Effect, Scale};
-use crate::generate::figures::{self, Ridden};
+use crate::generate::figures::{self, Concealed, Ridden};
 use crate::generate::form::{Form, Needs};
 use crate::generate::instrument::finding::Finding;
 use crate::generate::instrument::{ChainKind, Channels, Instruments, RunSpread};
@@ -60,31 +60,6 @@ pub const NULL_KINDS: [NullKind; 8] = [
     NullKind::NoisySlip,
     NullKind::Repeats,
 ];
-
-/// One figure of an effect in the contract's definition.
-#[derive(Clone, Debug, Serialize, Deserialize)]
-pub struct Figure {
-    pub name: String,
-    pub unit: String,
-    /// More than one where the contract leaves the choice of variable open.
-    pub values: Vec<f64>,
-    /// What the best estimator with the true form could reach on these runs; none where the parameter is not the
-    /// strength that was calibrated.
-    pub attainable_std: Option<f64>,
-}
-
-/// A concealed effect as the truth file tells it.
-#[derive(Clone, Debug, Serialize, Deserialize)]
-pub struct Concealed {
-    pub effect: Effect,
-    pub figures: Vec<Figure>,
-    /// Names that count as right for this form.
-    pub accept: Vec<String>,
-    /// Names that may stand beside it without being wrong.
-    pub tolerated: Vec<String>,
-    /// For an effect outside the vocabulary: the variables that it may be said to depend on.
-    pub variables: Vec<String>,
-}
 
 /// What awaits a prediction of one fresh run.
 #[derive(Clone, Debug, Serialize, Deserialize)]

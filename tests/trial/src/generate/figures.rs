@@ -1,13 +1,39 @@
 //! The figures of a concealed effect in the contract's definitions, measured on the true motion
 //! wherever the truth form has no such figure of its own.
 
-use crate::generate::campaign::{Concealed, Figure};
+use serde::{Deserialize, Serialize};
+
 use crate::generate::chain::{saturation_limit, share};
 use crate::generate::effect::{Effect, Scale};
 use crate::generate::form::{Form, OUTSIDE};
 use crate::generate::rig::Rig;
 use crate::generate::sim::{Motion, Stretch, bearing};
 use crate::generate::tyre::{Contact, Wear, radius_change, slip_length, static_curve};
+
+/// One figure of an effect in the contract's definition.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Figure {
+    pub name: String,
+    pub unit: String,
+    /// More than one where the contract leaves the choice of variable open.
+    pub values: Vec<f64>,
+    /// What the best estimator with the true form could reach on these runs; none where the parameter is not the
+    /// strength that was calibrated.
+    pub attainable_std: Option<f64>,
+}
+
+/// A concealed effect as the truth file tells it.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Concealed {
+    pub effect: Effect,
+    pub figures: Vec<Figure>,
+    /// Names that count as right for this form.
+    pub accept: Vec<String>,
+    /// Names that may stand beside it without being wrong.
+    pub tolerated: Vec<String>,
+    /// For an effect outside the vocabulary: the variables that it may be said to depend on.
+    pub variables: Vec<String>,
+}
 
 /// A run as it went, and where it stands in the campaign.
 pub struct Ridden<'a> {

@@ -108,142 +108,37 @@ pub enum Form {
 use Form as F;
 
 /// The vocabulary of the contract, each with its balance and its truth forms.
+#[rustfmt::skip] // a row each
 pub const VOCABULARY: [(&str, &str, &[Form]); 29] = [
-    (
-        "curve_shape",
-        "tyre",
-        &[
-            F::CurveMagic,
-            F::CurveBurckhardt,
-            F::CurveBrush,
-            F::CurveBroad,
-        ],
-    ),
-    (
-        "load_sensitivity",
-        "tyre",
-        &[F::LoadPower, F::LoadLinear, F::LoadPowerStiff],
-    ),
-    (
-        "speed_sensitivity",
-        "tyre",
-        &[
-            F::SpeedSlideExponential,
-            F::SpeedVehicleLinear,
-            F::SpeedStribeck,
-            F::SpeedSlideRational,
-        ],
-    ),
-    (
-        "thermal_fade",
-        "tyre",
-        &[F::ThermalOneNode, F::ThermalTwoNode, F::ThermalAirCooled],
-    ),
-    (
-        "relaxation_length",
-        "tyre",
-        &[F::RelaxSlip, F::RelaxForce, F::RelaxBrush, F::RelaxLoadSlip],
-    ),
-    (
-        "rolling_resistance",
-        "tyre",
-        &[F::RollConstant, F::RollSpeed],
-    ),
-    (
-        "effective_radius",
-        "tyre",
-        &[F::RadiusConstant, F::RadiusLoad, F::RadiusSpeed],
-    ),
-    (
-        "surface_patch",
-        "tyre",
-        &[F::PatchHard, F::PatchSmooth, F::PatchSeveral],
-    ),
-    (
-        "wear_drift",
-        "tyre",
-        &[F::WearEnergy, F::WearRun, F::WearDistance],
-    ),
-    (
-        "slip_hysteresis",
-        "tyre",
-        &[F::HysteresisDahl, F::HysteresisSign, F::HysteresisPlay],
-    ),
+    ("curve_shape", "tyre", &[F::CurveMagic, F::CurveBurckhardt, F::CurveBrush, F::CurveBroad]),
+    ("load_sensitivity", "tyre", &[F::LoadPower, F::LoadLinear, F::LoadPowerStiff]),
+    ("speed_sensitivity", "tyre", &[F::SpeedSlideExponential, F::SpeedVehicleLinear, F::SpeedStribeck, F::SpeedSlideRational]),
+    ("thermal_fade", "tyre", &[F::ThermalOneNode, F::ThermalTwoNode, F::ThermalAirCooled]),
+    ("relaxation_length", "tyre", &[F::RelaxSlip, F::RelaxForce, F::RelaxBrush, F::RelaxLoadSlip]),
+    ("rolling_resistance", "tyre", &[F::RollConstant, F::RollSpeed]),
+    ("effective_radius", "tyre", &[F::RadiusConstant, F::RadiusLoad, F::RadiusSpeed]),
+    ("surface_patch", "tyre", &[F::PatchHard, F::PatchSmooth, F::PatchSeveral]),
+    ("wear_drift", "tyre", &[F::WearEnergy, F::WearRun, F::WearDistance]),
+    ("slip_hysteresis", "tyre", &[F::HysteresisDahl, F::HysteresisSign, F::HysteresisPlay]),
     ("force_delay", "tyre", &[F::DelayPure, F::DelayHold]),
-    (
-        "force_lag",
-        "tyre",
-        &[F::LagOnePole, F::LagTwoPoles, F::LagMovingAverage],
-    ),
-    (
-        "structural_resonance",
-        "tyre",
-        &[F::ResonanceMode, F::ResonanceShare],
-    ),
-    (
-        "inertial_reaction",
-        "tyre",
-        &[F::InertialDirect, F::InertialSoft],
-    ),
-    (
-        "load_crosstalk",
-        "tyre",
-        &[F::CrosstalkConstant, F::CrosstalkBent],
-    ),
-    (
-        "zero_drift",
-        "tyre",
-        &[F::DriftLinear, F::DriftWarmUp, F::DriftClock, F::DriftSlow],
-    ),
+    ("force_lag", "tyre", &[F::LagOnePole, F::LagTwoPoles, F::LagMovingAverage]),
+    ("structural_resonance", "tyre", &[F::ResonanceMode, F::ResonanceShare]),
+    ("inertial_reaction", "tyre", &[F::InertialDirect, F::InertialSoft]),
+    ("load_crosstalk", "tyre", &[F::CrosstalkConstant, F::CrosstalkBent]),
+    ("zero_drift", "tyre", &[F::DriftLinear, F::DriftWarmUp, F::DriftClock, F::DriftSlow]),
     ("force_gain", "vehicle", &[F::GainConstant, F::GainBent]),
-    (
-        "force_saturation",
-        "tyre",
-        &[F::SaturationHard, F::SaturationSoft],
-    ),
-    (
-        "run_out",
-        "tyre",
-        &[F::RunOutLoad, F::RunOutRadius, F::RunOutAdditive],
-    ),
+    ("force_saturation", "tyre", &[F::SaturationHard, F::SaturationSoft]),
+    ("run_out", "tyre", &[F::RunOutLoad, F::RunOutRadius, F::RunOutAdditive]),
     ("encoder_ripple", "tyre", &[F::RippleSine, F::RippleTiming]),
-    (
-        "vehicle_speed_delay",
-        "tyre",
-        &[F::VehicleLate, F::VehicleLateHeld],
-    ),
-    (
-        "wheel_speed_delay",
-        "tyre",
-        &[F::WheelLate, F::WheelLateWindow],
-    ),
+    ("vehicle_speed_delay", "tyre", &[F::VehicleLate, F::VehicleLateHeld]),
+    ("wheel_speed_delay", "tyre", &[F::WheelLate, F::WheelLateWindow]),
     ("aero_drag", "vehicle", &[F::AeroStill, F::AeroHeadwind]),
-    (
-        "grade_or_drive",
-        "vehicle",
-        &[F::GradeConstant, F::GradeDrive],
-    ),
-    (
-        "vehicle_inertia",
-        "vehicle",
-        &[F::MassConstant, F::MassFuel],
-    ),
-    (
-        "bearing_drag",
-        "wheel",
-        &[F::BearingConstant, F::BearingSpeed, F::BearingLoad],
-    ),
+    ("grade_or_drive", "vehicle", &[F::GradeConstant, F::GradeDrive]),
+    ("vehicle_inertia", "vehicle", &[F::MassConstant, F::MassFuel]),
+    ("bearing_drag", "wheel", &[F::BearingConstant, F::BearingSpeed, F::BearingLoad]),
     ("brake_fade", "wheel", &[F::FadeTemperature, F::FadeEnergy]),
-    (
-        "brake_lag",
-        "wheel",
-        &[F::BrakeLagOne, F::BrakeLagTwo, F::BrakeLagDead],
-    ),
-    (
-        "wheel_inertia",
-        "wheel",
-        &[F::InertiaConstant, F::InertiaGrowth],
-    ),
+    ("brake_lag", "wheel", &[F::BrakeLagOne, F::BrakeLagTwo, F::BrakeLagDead]),
+    ("wheel_inertia", "wheel", &[F::InertiaConstant, F::InertiaGrowth]),
 ];
 
 /// Effects that no mechanism of the vocabulary accounts for: the form, its balance, and the words

@@ -114,32 +114,13 @@ impl Rig {
             }
         };
         let scale_car = kind == RigKind::ScaleCar;
-        let (radius, inertia, load, speed) = match kind {
-            RigKind::Trailer => (
-                draw.between(0.28, 0.335),
-                draw.between(0.8, 1.8),
-                draw.between(2800.0, 4800.0),
-                draw.between(17.0, 32.0),
-            ),
-            RigKind::Drum => (
-                draw.between(0.27, 0.33),
-                draw.between(0.9, 2.2),
-                draw.between(2500.0, 5500.0),
-                draw.between(12.0, 30.0),
-            ),
-            RigKind::Aircraft => (
-                draw.between(0.45, 0.6),
-                draw.between(7.0, 18.0),
-                draw.between(28e3, 55e3),
-                draw.between(40.0, 68.0),
-            ),
-            RigKind::ScaleCar => (
-                draw.between(0.030, 0.036),
-                draw.between(2.5e-5, 6e-5),
-                draw.between(7.0, 14.0),
-                draw.between(2.0, 3.6),
-            ),
+        let ranges = match kind {
+            RigKind::Trailer => [(0.28, 0.335), (0.8, 1.8), (2800.0, 4800.0), (17.0, 32.0)],
+            RigKind::Drum => [(0.27, 0.33), (0.9, 2.2), (2500.0, 5500.0), (12.0, 30.0)],
+            RigKind::Aircraft => [(0.45, 0.6), (7.0, 18.0), (28e3, 55e3), (40.0, 68.0)],
+            RigKind::ScaleCar => [(0.030, 0.036), (2.5e-5, 6e-5), (7.0, 14.0), (2.0, 3.6)],
         };
+        let [radius, inertia, load, speed] = ranges.map(|(low, high)| draw.between(low, high));
         let peak_friction = if kind == RigKind::Aircraft {
             draw.between(0.5, 0.8)
         } else {

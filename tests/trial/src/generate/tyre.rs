@@ -130,18 +130,24 @@ impl<'a> Tyre<'a> {
         }
         let slip_now = (contact.speed - radius * contact.wheel) / contact.speed;
         let first = !memory.slip.is_finite();
-        let slip_step = if first { 0.0 } else { slip_now - memory.slip };
-        let load_step = if first {
-            0.0
-        } else {
-            contact.load - memory.load
+        let since = |before: f64, now: f64| if first { 0.0 } else { now - before };
+        let step = Step {
+            dt,
+            first,
+            contact,
+            scale,
+            slip: since(memory.slip, slip_now),
+            load: since(memory.load, contact.load),
+            run: self.run,
+            energy: memory.energy,
+            slid: memory.slid,
         };
         memory.slip = slip_now;
         memory.load = contact.load;
 
         let mut slip = slip_now;
         for (effect, slots) in effects.iter().zip(memory.slots.iter_mut()) {
-            slip = slip_dynamics(effect, slots, slip, slip_step, dt, contact, first, scale);
+            slip = slip_dynamics(effect, slots, slip, &step);
         }
         let mut peak = self.peak_friction;
         let mut critical = self.critical_slip;
@@ -157,31 +163,12 @@ impl<'a> Tyre<'a> {
         }
         let sliding = (contact.speed - radius * contact.wheel).abs();
         for (effect, slots) in effects.iter().zip(memory.slots.iter_mut()) {
-            friction *= friction_factor(
-                effect,
-                slots,
-                slip,
-                slip_step,
-                load_step,
-                sliding,
-                dt,
-                contact,
-                first,
-                scale,
-                self.run,
-                memory.energy,
-                memory.slid,
-            );
+            friction *= friction_factor(effect, slots, slip, sliding, &step);
         }
         let mut drag = friction * contact.load;
         for (effect, slots) in effects.iter().zip(memory.slots.iter_mut()) {
             if effect.form == Form::RelaxForce {
-                let share = if first {
-                    1.0
-                } else {
-                    approach(dt, effect.a / contact.speed)
-                };
-                slots[0] += share * (drag - slots[0]);
+                slots[0] += step.share(effect.a) * (drag - slots[0]);
                 drag = slots[0];
             }
         }
@@ -290,21 +277,42 @@ pub fn static_curve(effects: &[Effect], truth: (f64, f64), slip: f64) -> f64 {
                 .sum::<f64>())
 }
 
-/// Relaxation and play: what the contact's slip is, given the wheel's.
-#[expect(
-    clippy::too_many_arguments,
-    reason = "one call, each argument a plain number"
-)]
-fn slip_dynamics(
-    effect: &Effect,
-    slots: &mut [f64; SLOTS],
-    slip: f64,
-    step: f64,
+/// From one instant to the next.
+struct Step<'a> {
     dt: f64,
-    contact: &Contact,
+    /// There is no instant before.
     first: bool,
-    scale: &Scale,
-) -> f64 {
+    contact: &'a Contact,
+    scale: &'a Scale,
+    /// By how much the wheel's slip and the load have changed.
+    slip: f64,
+    load: f64,
+    /// What the tyre has behind it: runs, sliding energy, sliding distance.
+    run: f64,
+    energy: f64,
+    slid: f64,
+}
+
+impl Step<'_> {
+    /// How much of the way a lag of this length goes.
+    fn share(&self, length: f64) -> f64 {
+        if self.first {
+            1.0
+        } else {
+            approach(self.dt, length / self.contact.speed)
+        }
+    }
+}
+
+/// Relaxation and play: what the contact's slip is, given the wheel's.
+fn slip_dynamics(effect: &Effect, slots: &mut [f64; SLOTS], slip: f64, step: &Step<'_>) -> f64 {
+    let Step {
+        dt,
+        first,
+        contact,
+        scale,
+        ..
+    } = *step;
     match effect.form {
         Form::RelaxSlip | Form::RelaxLoadSlip => {
             let length = if effect.form == Form::RelaxSlip {
@@ -312,12 +320,7 @@ fn slip_dynamics(
             } else {
                 slip_length(effect, slip, contact.load, scale)
             };
-            let share = if first {
-                1.0
-            } else {
-                approach(dt, length / contact.speed)
-            };
-            slots[0] += share * (slip - slots[0]);
+            slots[0] += step.share(length) * (slip - slots[0]);
             slots[0]
         }
         Form::RelaxBrush => {
@@ -344,7 +347,6 @@ fn slip_dynamics(
             if first {
                 slots[0] = slip;
             }
-            let _ = step;
             slots[0] = slots[0].clamp(slip - half, slip + half);
             slots[0]
         }
@@ -359,25 +361,24 @@ pub fn slip_length(effect: &Effect, slip: f64, load: f64, scale: &Scale) -> f64 
 }
 
 /// Everything that multiplies friction.
-#[expect(
-    clippy::too_many_arguments,
-    reason = "one call, each argument a plain number"
-)]
 fn friction_factor(
     effect: &Effect,
     slots: &mut [f64; SLOTS],
     slip: f64,
-    slip_step: f64,
-    load_step: f64,
     sliding: f64,
-    dt: f64,
-    contact: &Contact,
-    first: bool,
-    scale: &Scale,
-    run: f64,
-    energy: f64,
-    slid: f64,
+    step: &Step<'_>,
 ) -> f64 {
+    let Step {
+        dt,
+        first,
+        contact,
+        scale,
+        slip: slip_step,
+        load: load_step,
+        run,
+        energy,
+        slid,
+    } = *step;
     let a = effect.a;
     let p = &effect.p;
     let rate = |slots: &mut [f64; SLOTS], step: f64, smoothing: f64| {

@@ -150,12 +150,10 @@ pub fn headlines(cases: &[Case]) -> Vec<Headline> {
     use Better::{Higher, Lower};
     let mut all = Vec::new();
     for family in families(cases) {
-        let key = |stem: &str| family.key(stem);
-        let what = |words: &str| family.what(words);
         let brier = brier(cases, family);
         all.push(Headline::number(
-            &key("confidence.brier"),
-            &what("Brier score of confidence"),
+            &family.key("confidence.brier"),
+            &family.what("Brier score of confidence"),
             Lower,
             None,
             brier.map_or((f64::NAN, f64::NAN, f64::NAN), |brier| {
@@ -164,8 +162,8 @@ pub fn headlines(cases: &[Case]) -> Vec<Headline> {
             brier.map_or(0, |brier| brier.calls),
         ));
         all.push(Headline::share(
-            &key("confidence.right_at_0.9"),
-            &what("calls at 0.9 or more: right"),
+            &family.key("confidence.right_at_0.9"),
+            &family.what("calls at 0.9 or more: right"),
             Higher,
             Some(0.9),
             Share::count(

@@ -9,7 +9,7 @@ use serde_json::Value;
 use crate::contract::{breaches, list, number, text};
 use crate::generate::campaign::Truth;
 use crate::generate::instrument::ChainKind;
-use crate::judge::findings::{false_findings, finding};
+use crate::judge::findings::{FindingCase, false_findings, finding};
 use crate::judge::gain::{GainCase, gains};
 use crate::judge::names::{self, Standing, standing};
 use crate::judge::timing::{self, LateCase, Timing};
@@ -44,18 +44,6 @@ pub struct FigureCase {
     /// Standard deviation that least squares with the true form could reach on these recordings; none where the
     /// parameter is not the strength that the effect was calibrated by.
     pub attainable_std: Option<f64>,
-}
-
-/// What the measuring chain did, and whether `chain` says so.
-#[derive(Clone, Debug, Serialize)]
-pub struct FindingCase {
-    pub channel: String,
-    pub finding: String,
-    pub truth: f64,
-    /// Reported value and standard deviation, of the finding of that kind and channel.
-    pub reported: Option<(f64, f64)>,
-    /// Found, with its value within 20 % or 2 ms.
-    pub right: bool,
 }
 
 /// One campaign, judged.

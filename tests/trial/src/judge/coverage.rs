@@ -250,36 +250,34 @@ pub fn headlines(cases: &[Case]) -> Vec<Headline> {
     use Better::{Higher, Lower};
     let mut all = Vec::new();
     for family in families(cases) {
-        let key = |stem: &str| family.key(stem);
-        let what = |words: &str| family.what(words);
         let campaigns = all_figures(cases, family);
         let figures: Vec<&FigureCase> = campaigns.iter().flatten().copied().collect();
         for (limit, nominal, half) in [(1, NORMAL[0], 0.08), (2, NORMAL[1], 0.03)] {
             all.push(Headline::share_off_nominal(
-                &key(&format!("figures.within{limit}")),
-                &what(&format!("figures within {limit} of their std")),
+                &family.key(&format!("figures.within{limit}")),
+                &family.what(&format!("figures within {limit} of their std")),
                 Some(half),
                 nominal,
                 within(figures.iter().copied(), f64::from(limit)),
             ));
         }
         all.push(Headline::share(
-            &key("figures.within3"),
-            &what("figures within 3 of their std"),
+            &family.key("figures.within3"),
+            &family.what("figures within 3 of their std"),
             Higher,
             Some(0.985),
             within(figures.iter().copied(), 3.0),
         ));
         all.push(Headline::share_off_nominal(
-            &key("base.within2"),
-            &what("nothing missing: base parameters within 2 of their std"),
+            &family.key("base.within2"),
+            &family.what("nothing missing: base parameters within 2 of their std"),
             Some(0.03),
             NORMAL[1],
             within(family.of(cases).flat_map(|case| &case.base), 2.0),
         ));
         all.push(Headline::quantile(
-            &key("figures.sharpness"),
-            &what("std of figures over the attainable, median"),
+            &family.key("figures.sharpness"),
+            &family.what("std of figures over the attainable, median"),
             Lower,
             Some(1.3),
             &widths(figures.iter().copied()),
@@ -287,8 +285,8 @@ pub fn headlines(cases: &[Case]) -> Vec<Headline> {
         ));
         let sharpness = Sharpness::of(campaigns);
         all.push(Headline::number(
-            &key("figures.crps_ratio"),
-            &what("CRPS of figures over that with the best factor on the stds"),
+            &family.key("figures.crps_ratio"),
+            &family.what("CRPS of figures over that with the best factor on the stds"),
             Lower,
             None,
             sharpness.ratio(),

@@ -113,8 +113,9 @@ pub mod toy {
     use std::sync::OnceLock;
 
     use super::*;
-    use crate::generate::campaign::{Concealed, Figure, NullKind, Order, Truth, make};
+    use crate::generate::campaign::{NullKind, Order, Truth, make};
     use crate::generate::effect::Effect;
+    use crate::generate::figures::{Concealed, Figure};
     use crate::generate::form::Form;
     use crate::generate::instrument::ChainKind;
     use crate::judge::case::{FigureCase, Named};

@@ -1,5 +1,6 @@
 //! Whether `chain` tells the one effect of a measuring chain that is there, and nothing that is not.
 
+use serde::Serialize;
 use serde_json::Value;
 
 use crate::contract::{list, number, text};
@@ -7,8 +8,19 @@ use crate::generate::campaign::Truth;
 use crate::generate::instrument::ChainKind;
 use crate::generate::instrument::finding::Finding;
 use crate::generate::rig::NoiseKind;
-use crate::judge::case::FindingCase;
 use crate::judge::timing::{RELATIVE_SLACK, TIME_SLACK_S, Timing};
+
+/// What the measuring chain did, and whether `chain` says so.
+#[derive(Clone, Debug, Serialize)]
+pub struct FindingCase {
+    pub channel: String,
+    pub finding: String,
+    pub truth: f64,
+    /// Reported value and standard deviation, of the finding of that kind and channel.
+    pub reported: Option<(f64, f64)>,
+    /// Found, with its value within 20 % or 2 ms.
+    pub right: bool,
+}
 
 /// What `chain` says of the one effect of a chain that a campaign has: any entry of it, as there may be one a run.
 pub fn finding(truth: &Truth, diagnosis: &Value) -> Option<FindingCase> {

@@ -54,6 +54,15 @@ pub struct Shown {
     pub high: f64,
 }
 
+/// Nothing is known of a share of nothing.
+fn interval(share: Share) -> (f64, f64) {
+    if share.of == 0 {
+        (f64::NAN, f64::NAN)
+    } else {
+        share.interval()
+    }
+}
+
 impl Headline {
     /// A share of counted cases.
     pub fn share(
@@ -63,11 +72,7 @@ impl Headline {
         bar: Option<f64>,
         share: Share,
     ) -> Headline {
-        let (low, high) = if share.of == 0 {
-            (f64::NAN, f64::NAN)
-        } else {
-            share.interval()
-        };
+        let (low, high) = interval(share);
         Headline {
             key: key.to_owned(),
             what: what.to_owned(),
@@ -184,11 +189,7 @@ impl Headline {
         nominal: f64,
         share: Share,
     ) -> Headline {
-        let (low, high) = if share.of == 0 {
-            (f64::NAN, f64::NAN)
-        } else {
-            share.interval()
-        };
+        let (low, high) = interval(share);
         let shown = Shown {
             nominal,
             value: share.value(),

@@ -111,8 +111,6 @@ pub fn headlines(cases: &[Case]) -> Vec<Headline> {
     use Better::Lower;
     let mut all = Vec::new();
     for family in families(cases) {
-        let key = |stem: &str| family.key(stem);
-        let what = |words: &str| family.what(words);
         for place in [""].into_iter().chain(PLACES) {
             let runs = gains(cases, family, place);
             let (end, of) = if place.is_empty() {
@@ -121,16 +119,16 @@ pub fn headlines(cases: &[Case]) -> Vec<Headline> {
                 (format!(".{place}"), format!("{place} runs unseen"))
             };
             all.push(Headline::share(
-                &key(&format!("predictions.worse{end}")),
-                &what(&format!("{of}: repaired worse than base by 1 %")),
+                &family.key(&format!("predictions.worse{end}")),
+                &family.what(&format!("{of}: repaired worse than base by 1 %")),
                 Lower,
                 Some(0.005),
                 Share::count(&runs, |gain| gain.worse),
             ));
             if place.is_empty() {
                 all.push(Headline::share(
-                    &key("predictions.base_worse"),
-                    &what(&format!("{of}: base worse than least squares by 1 %")),
+                    &family.key("predictions.base_worse"),
+                    &family.what(&format!("{of}: base worse than least squares by 1 %")),
                     Lower,
                     None,
                     Share::count(&runs, |gain| gain.base_worse),
@@ -139,8 +137,8 @@ pub fn headlines(cases: &[Case]) -> Vec<Headline> {
             let bands = bands(&runs);
             let (value, error) = mean(&bands);
             all.push(Headline::off_nominal(
-                &key(&format!("predictions.band90{end}")),
-                &what(&format!("{of}: written reading within the 90 % band")),
+                &family.key(&format!("predictions.band90{end}")),
+                &family.what(&format!("{of}: written reading within the 90 % band")),
                 None,
                 Shown {
                     nominal: 0.90,
@@ -152,8 +150,8 @@ pub fn headlines(cases: &[Case]) -> Vec<Headline> {
             ));
             if place.is_empty() {
                 all.push(Headline::quantile(
-                    &key("predictions.band_score"),
-                    &what(&format!(
+                    &family.key("predictions.band_score"),
+                    &family.what(&format!(
                         "{of}: score of the 90 % band over the base's, median"
                     )),
                     Lower,

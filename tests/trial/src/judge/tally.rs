@@ -3,7 +3,8 @@
 use std::collections::BTreeMap;
 
 use crate::generate::form::{OUTSIDE, VOCABULARY};
-use crate::judge::case::{BAR_STRENGTH, Case, FindingCase};
+use crate::judge::case::{BAR_STRENGTH, Case};
+use crate::judge::findings::FindingCase;
 use crate::share::{Share, mean, percent, quantile};
 use crate::table::Table;
 

@@ -17,7 +17,7 @@ use crate::draw::Draw;
 use crate::generate::files::seal;
 use crate::generate::tyre::law;
 use crate::judge::headline::{Better, Headline};
-use crate::report::trial::Trial;
+use crate::setup::Trial;
 use crate::share::Share;
 use crate::table::Table;
 

@@ -11,6 +11,7 @@
 mod ask;
 mod coast;
 mod curve;
+mod fold;
 mod injected;
 mod page;
 mod picture;
@@ -29,13 +30,13 @@ use serde_json::Value;
 
 use crate::contract::{list, number, text};
 use crate::judge::headline::{Better, Headline};
-use crate::report::trial::Trial;
+use crate::setup::Trial;
 use crate::share::Share;
 use crate::table::Table;
 
 use ask::{Answer, Ask};
+use fold::Fold;
 use placebo::{COPY, Fate, Placebo};
-use prediction::Fold;
 use sets::{Loaded, SETS, Set};
 
 /// What a study of measured recordings found.

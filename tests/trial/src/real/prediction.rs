@@ -3,44 +3,12 @@
 use anyhow::Result;
 
 use super::ask::Ask;
+use super::fold::Fold;
 use super::placebo::OF_SPEEDS;
 use super::recording::DRAG;
 use super::sets::{Loaded, confidence};
 use super::told;
 use crate::contract::{list, text};
-
-/// A repaired model is worse where its mean squared error exceeds the base's by more than this share.
-const WORSE: f64 = 0.01;
-
-/// One run left out and predicted.
-#[derive(Clone, Debug, Default)]
-pub(super) struct Fold {
-    /// The run left out.
-    pub(super) run: String,
-    /// What was said of the others.
-    pub(super) told: String,
-    /// Mean squared errors in N², not a number where nothing was predicted.
-    pub(super) repaired: f64,
-    pub(super) base: f64,
-    /// Names that work through the force, surer than a half.
-    pub(super) sure: usize,
-}
-
-impl Fold {
-    /// Mean squared error of the repaired model over the base's.
-    pub(super) fn ratio(&self) -> f64 {
-        if self.repaired == 0.0 && self.base == 0.0 {
-            1.0
-        } else {
-            self.repaired / self.base
-        }
-    }
-
-    /// Also where one of the two predicts nothing.
-    pub(super) fn worse(&self) -> bool {
-        self.ratio().is_nan() || self.ratio() > 1.0 + WORSE
-    }
-}
 
 /// Mean squared difference where both are known; not a number where that is less than half of the run.
 fn mean_square(predicted: Option<Vec<f64>>, drag: &[f64]) -> f64 {
@@ -87,16 +55,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_fold_is_worse_by_one_per_cent_or_without_a_prediction() {
-        let fold = |repaired: f64, base: f64| Fold {
-            repaired,
-            base,
-            ..Fold::default()
-        };
-        assert!(!fold(1.009, 1.0).worse());
-        assert!(fold(1.011, 1.0).worse());
-        assert!(fold(f64::NAN, 1.0).worse());
-        assert!(!fold(0.0, 0.0).worse());
+    fn what_is_known_of_less_than_half_of_a_run_has_no_mean_square() {
         assert!(
             (mean_square(Some(vec![1.0, f64::NAN, 3.0]), &[0.0, 0.0, 3.0]) - 0.5).abs() < 1e-12
         );

@@ -6,8 +6,8 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result};
 use serde_json::Value;
 
+use super::fold::Fold;
 use super::placebo::{self, Placebo, leaks};
-use super::prediction::Fold;
 use super::recording::Recording;
 use super::{figure, told};
 use crate::contract::{list, number, text};

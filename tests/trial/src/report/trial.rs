@@ -18,45 +18,14 @@ use crate::report::pace::{self, Pace};
 use crate::report::pages::{self, Telling};
 use crate::report::ratchet;
 use crate::report::seal::{SeedUse, Void, enter, seed_use, voids};
+use crate::setup::Trial;
 use crate::tool::Tool;
-
-/// What a trial is made with.
-#[derive(Clone, Debug)]
-pub struct Trial {
-    /// The tool under trial.
-    pub tool: Tool,
-    /// An earlier engine, tried on a part of the same files.
-    pub rival: Option<PathBuf>,
-    /// Commit that the tool was built from, where it was built from one and nothing else.
-    pub commit: Option<String>,
-    /// Seed of every draw: below 1000 to develop, 1000 to 1999 for continuous integration, from 20,000 to report.
-    pub seed: u64,
-    /// A tenth of the campaigns, held against the ratchet.
-    pub small: bool,
-    /// Write the ratchet anew instead of holding against it.
-    pub bless: bool,
-    /// Campaigns of each stratum, as a share of the full trial's.
-    pub scale: f64,
-    /// Scratch directory for campaigns and answers; what is there of the same trial is not made again.
-    pub work: PathBuf,
-    /// Directory of `trials.md`, left alone where absent.
-    pub pages: Option<PathBuf>,
-    /// Measured recordings, `dart-coastdown` and `dart-friction` in it.
-    pub data: PathBuf,
-    /// Campaigns at the same time.
-    pub jobs: usize,
-    /// Ten million samples are diagnosed too, which takes gigabytes of disk and of memory.
-    pub ten_million: bool,
-}
 
 /// Figures that may not get worse, and seeds that were reported on, from the project's root.
 const RATCHET: &str = ".ci/trial.toml";
 const LEDGER: &str = "docs/trials/seeds.txt";
 /// An earlier engine is tried on every n-th campaign.
 const RIVAL_EVERY: usize = 6;
-/// The small trial's share of the whole.
-const SMALL: f64 = 0.1;
-
 /// Campaigns of each stratum at full size: whole rounds of the kinds, mechanisms and effects of a chain, so that a
 /// bar can be told from its neighbour.
 const FULL: [(&str, bool, usize); 9] = [
@@ -70,12 +39,6 @@ const FULL: [(&str, bool, usize); 9] = [
     ("outside", true, 34),
     ("outside", false, 34),
 ];
-
-impl Trial {
-    fn scale(&self) -> f64 {
-        if self.small { SMALL } else { self.scale }
-    }
-}
 
 fn requests(trial: &Trial) -> Vec<Request> {
     FULL.into_iter()
