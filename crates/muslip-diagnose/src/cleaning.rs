@@ -9,6 +9,28 @@ use crate::smooth::difference_sigma;
 const ABSURD: f64 = 1e15;
 /// Longest run of missing values that is bridged by a straight line, in samples.
 const BRIDGE: usize = 4;
+/// A value that stays the very same for so many s is frozen.
+const HOLD_S: f64 = 0.08;
+
+/// Where faults of one channel are told.
+struct Told<'a> {
+    name: &'a str,
+    channel: &'a str,
+    time: &'a [f64],
+    faults: &'a mut Vec<DataFault>,
+}
+
+impl Told<'_> {
+    fn fault(&mut self, from: usize, to: usize, what: String) {
+        self.faults.push(DataFault {
+            recording: self.name.to_owned(),
+            channel: self.channel.to_owned(),
+            start_s: self.time.get(from).copied().unwrap_or(0.0),
+            end_s: self.time.get(to).copied().unwrap_or(0.0),
+            what,
+        });
+    }
+}
 
 /// Cleans one channel: absurd values, spikes, short gaps. Returns the cleaned values and whether each
 /// sample may be used.
@@ -19,85 +41,89 @@ pub(crate) fn clean(
     values: &[f64],
     faults: &mut Vec<DataFault>,
 ) -> (Vec<f64>, Vec<bool>) {
-    let n = values.len();
-    let mut x: Vec<f64> = values
+    let mut told = Told {
+        name,
+        channel,
+        time,
+        faults,
+    };
+    let mut x = without_absurd(values, &mut told);
+    let mut usable = vec![true; x.len()];
+    let sigma = difference_sigma(&x);
+    if sigma > 0.0 {
+        take_spikes(&mut x, sigma, &mut told);
+        mark_frozen(&x, &mut usable, &mut told);
+    }
+    bridge(&mut x, &mut usable, &mut told);
+    (x, usable)
+}
+
+fn without_absurd(values: &[f64], told: &mut Told<'_>) -> Vec<f64> {
+    let x: Vec<f64> = values
         .iter()
         .map(|v| if v.abs() < ABSURD { *v } else { f64::NAN })
         .collect();
-    let mut report = |from: usize, to: usize, what: String| {
-        faults.push(DataFault {
-            recording: name.to_owned(),
-            channel: channel.to_owned(),
-            start_s: time.get(from).copied().unwrap_or(0.0),
-            end_s: time.get(to).copied().unwrap_or(0.0),
-            what,
-        });
-    };
-    let absurd: Vec<usize> = (0..n)
+    let absurd: Vec<usize> = (0..x.len())
         .filter(|&k| !values[k].is_nan() && !x[k].is_finite())
         .collect();
     if let (Some(&first), Some(&last)) = (absurd.first(), absurd.last()) {
-        report(
-            first,
-            last,
-            format!("{} values beyond any measurement", absurd.len()),
-        );
+        let what = format!("{} values beyond any measurement", absurd.len());
+        told.fault(first, last, what);
     }
-    // Spikes: far from the median of four neighbours, by the noise and by the neighbours' own spread.
-    let sigma = difference_sigma(&x);
-    let mut spikes = Vec::new();
-    if sigma > 0.0 && n >= 7 {
-        let original = x.clone();
-        for k in 2..n - 2 {
-            if !original[k].is_finite() {
-                continue;
-            }
-            let mut near = [
-                original[k - 2],
-                original[k - 1],
-                original[k + 1],
-                original[k + 2],
-            ];
-            if near.iter().any(|v| !v.is_finite()) {
-                continue;
-            }
-            near.sort_by(f64::total_cmp);
-            let centre = 0.5 * (near[1] + near[2]);
-            let spread = near[3] - near[0];
-            if (original[k] - centre).abs() > 7.0 * sigma + 3.0 * spread {
-                spikes.push(k);
-            }
-        }
-        for &k in &spikes {
-            x[k] = f64::NAN;
-        }
-        if let (Some(&first), Some(&last)) = (spikes.first(), spikes.last()) {
-            let outliers = match spikes.len() {
-                1 => "1 isolated outlier".to_owned(),
-                many => format!("{many} isolated outliers"),
-            };
-            report(first, last, outliers);
-        }
+    x
+}
+
+/// Takes out what is far from the median of four neighbours, by the noise and by the neighbours' own spread.
+fn take_spikes(x: &mut [f64], sigma: f64, told: &mut Told<'_>) {
+    let n = x.len();
+    if n < 7 {
+        return;
     }
-    // Frozen: the very same non-zero value for long, in a channel that otherwise moves.
-    let moving = sigma > 0.0;
-    let mut usable = vec![true; n];
-    let hold = 0.08_f64;
+    let is_spike = |k: usize| {
+        let mut near = [x[k - 2], x[k - 1], x[k + 1], x[k + 2]];
+        if !x[k].is_finite() || near.iter().any(|v| !v.is_finite()) {
+            return false;
+        }
+        near.sort_by(f64::total_cmp);
+        let centre = 0.5 * (near[1] + near[2]);
+        let spread = near[3] - near[0];
+        (x[k] - centre).abs() > 7.0 * sigma + 3.0 * spread
+    };
+    let spikes: Vec<usize> = (2..n - 2).filter(|&k| is_spike(k)).collect();
+    for &k in &spikes {
+        x[k] = f64::NAN;
+    }
+    if let (Some(&first), Some(&last)) = (spikes.first(), spikes.last()) {
+        let outliers = match spikes.len() {
+            1 => "1 isolated outlier".to_owned(),
+            many => format!("{many} isolated outliers"),
+        };
+        told.fault(first, last, outliers);
+    }
+}
+
+/// Frozen: the very same non-zero value for long, in a channel that otherwise moves.
+fn mark_frozen(x: &[f64], usable: &mut [bool], told: &mut Told<'_>) {
+    let n = x.len();
     let mut k = 0;
     while k < n {
         let mut end = k + 1;
         while end < n && x[end] == x[k] && x[k].is_finite() {
             end += 1;
         }
-        let long = end - k >= 20 && time[end - 1] - time[k] >= hold;
+        let long = end - k >= 20 && told.time[end - 1] - told.time[k] >= HOLD_S;
         let everything = end - k > n * 3 / 4;
-        if moving && long && !everything && x[k] != 0.0 {
-            report(k, end - 1, "frozen or clipped".to_owned());
+        if long && !everything && x[k] != 0.0 {
+            told.fault(k, end - 1, "frozen or clipped".to_owned());
             usable[k..end].fill(false);
         }
         k = end;
     }
-    // Bridge what is missing.
+}
+
+/// Bridges what is missing; only what is missing for a short time may be used all the same.
+fn bridge(x: &mut [f64], usable: &mut [bool], told: &mut Told<'_>) {
+    let (n, time) = (x.len(), told.time);
     let mut missing_cells = 0;
     let mut long_gap: Option<(usize, usize)> = None;
     let mut k = 0;
@@ -137,9 +163,8 @@ pub(crate) fn clean(
         } else {
             format!("{missing_cells} values missing")
         };
-        report(from, to - 1, what);
+        told.fault(from, to - 1, what);
     }
-    (x, usable)
 }
 
 pub(crate) fn stretches(

@@ -122,14 +122,106 @@ pub fn prepare(
     reach_factor: f64,
 ) -> (Series, Vec<DataFault>) {
     let mut faults = Vec::new();
-    let time = &run.time_s;
+    let (name, time) = (run.name.as_str(), &run.time_s);
     let n = time.len();
-    let name = run.name.as_str();
-    let mut steps: Vec<f64> = time.windows(2).map(|w| w[1] - w[0]).collect();
-    let typical_dt = if steps.is_empty() {
+    let Steps {
+        typical_dt,
+        dt,
+        breaks,
+    } = steps(name, time, &mut faults);
+    let mut cleaned = |column: &str, values: &[f64]| clean(name, column, time, values, &mut faults);
+    let (omega, omega_ok) = cleaned("wheel_speed_rad_s", &run.wheel_speed_rad_s);
+    let (v, v_ok) = cleaned("vehicle_speed_m_s", &run.vehicle_speed_m_s);
+    let (load, load_ok) = cleaned("normal_force_n", &run.normal_force_n);
+    let has_drag = run.drag_force_n.len() == n && n > 0;
+    let (drag, mut drag_ok) = if has_drag {
+        cleaned("drag_force_n", &run.drag_force_n)
+    } else {
+        (Vec::new(), vec![false; n])
+    };
+    if has_drag {
+        keep_clipped(&run.drag_force_n, &drag, &mut drag_ok);
+    }
+    let brake = brake(rig, run).map(|(column, values)| cleaned(column, &values));
+
+    let finite = |k: usize| omega[k].is_finite() && v[k].is_finite() && load[k].is_finite();
+    let continuous = stretches(finite, &breaks, 3);
+    let (omega_sigma, v_sigma) = (difference_sigma(&omega), difference_sigma(&v));
+    let load_sigma = difference_sigma(&load);
+    // No window may average over more than a sixth of a wheel revolution on either side.
+    let reach: Vec<f64> = (0..n)
+        .map(|k| {
+            let revolution = core::f64::consts::TAU / omega[k].abs().max(1.0);
+            let reach = MAX_REACH_S.min(revolution / 6.0).max(2.2 * typical_dt);
+            (reach_factor * reach).max(LEAST_REACH * typical_dt)
+        })
+        .collect();
+    let slow = (2.0 * MAX_REACH_S).max(4.2 * typical_dt);
+    let slow_reach: Vec<f64> = vec![(reach_factor * slow).max(LEAST_REACH * typical_dt); n];
+    let own_stretches = |x: &[f64]| stretches(|k| x[k].is_finite(), &breaks, 3);
+    let (torque, brake_ok) = brake.map_or((None, Vec::new()), |(values, ok)| {
+        let sigma = difference_sigma(&values);
+        let segments = own_stretches(&values);
+        (Some(channel(time, values, &segments, sigma, &reach)), ok)
+    });
+    let (drag_sigma, drag_smooth) = if has_drag {
+        let sigma = difference_sigma(&drag);
+        let smoothed = smooth(time, &drag, &own_stretches(&drag), sigma, &reach);
+        (sigma, smoothed.value)
+    } else {
+        (0.0, Vec::new())
+    };
+    let mut series = Series {
+        name: run.name.clone(),
+        time: time.clone(),
+        typical_dt,
+        wheel: channel(time, omega, &continuous, omega_sigma, &reach),
+        speed: channel(time, v, &continuous, v_sigma, &slow_reach),
+        load: channel(time, load, &continuous, load_sigma, &reach),
+        drag,
+        drag_smooth,
+        drag_sigma,
+        torque,
+        index,
+        ..Series::default()
+    };
+    let sound = Sound {
+        wheel: omega_ok,
+        speed: v_ok,
+        load: load_ok,
+        drag: drag_ok,
+        brake: brake_ok,
+    };
+    classify(&mut series, rig);
+    form_balances(&mut series, rig, &sound, &breaks);
+    series.distance = travelled(&series.speed.smooth, &dt);
+    series.angle = travelled(&series.wheel.smooth, &dt);
+    series.dt = dt;
+    let wheel = &series.wheel;
+    series.wheel_smoothing =
+        turn::smoothing(&series.angle, &wheel.raw, &wheel.smooth, &series.rolling);
+    series.extra = extra_names
+        .iter()
+        .map(|wanted| extra(run, wanted, &mut faults))
+        .collect();
+    (series, faults)
+}
+
+/// The steps of a recording's time.
+struct Steps {
+    typical_dt: f64,
+    dt: Vec<f64>,
+    /// Whether a gap lies before the sample.
+    breaks: Vec<bool>,
+}
+
+fn steps(name: &str, time: &[f64], faults: &mut Vec<DataFault>) -> Steps {
+    let n = time.len();
+    let mut all: Vec<f64> = time.windows(2).map(|w| w[1] - w[0]).collect();
+    let typical_dt = if all.is_empty() {
         1.0
     } else {
-        median_in_place(&mut steps)
+        median_in_place(&mut all)
     };
     let mut dt = vec![typical_dt; n];
     let mut breaks = vec![false; n];
@@ -149,206 +241,122 @@ pub fn prepare(
     if n > 1 {
         dt[0] = dt[1];
     }
-    let (omega, omega_ok) = clean(
-        name,
-        "wheel_speed_rad_s",
-        time,
-        &run.wheel_speed_rad_s,
-        &mut faults,
-    );
-    let (v, v_ok) = clean(
-        name,
-        "vehicle_speed_m_s",
-        time,
-        &run.vehicle_speed_m_s,
-        &mut faults,
-    );
-    let (load, load_ok) = clean(
-        name,
-        "normal_force_n",
-        time,
-        &run.normal_force_n,
-        &mut faults,
-    );
-    let has_drag = run.drag_force_n.len() == n && n > 0;
-    let (drag, mut drag_ok) = if has_drag {
-        clean(name, "drag_force_n", time, &run.drag_force_n, &mut faults)
-    } else {
-        (Vec::new(), vec![false; n])
-    };
-    // A drag channel frozen at its own extreme clips: that is the channel's physics
-    // (`force_saturation`), reported as a fault of the data but kept for the fit.
-    if has_drag {
-        let largest = drag.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-        for k in 0..n {
-            if !drag_ok[k]
-                && run.drag_force_n[k].is_finite()
-                && drag[k] >= largest * (1.0 - 1e-9)
-                && largest > 0.0
-            {
-                drag_ok[k] = true;
-            }
-        }
+    Steps {
+        typical_dt,
+        dt,
+        breaks,
     }
-    let commanded = match (&run.brake_pressure_pa, rig.torque_per_pressure_nm_pa) {
-        (Some(p), Some(gain)) if p.iter().any(|x| x.is_finite()) => Some((
-            "brake_pressure_pa",
-            p.iter().map(|x| x * gain).collect::<Vec<f64>>(),
-        )),
-        _ => None,
-    };
-    let brake = commanded.or_else(|| {
-        run.brake_torque_nm
-            .as_ref()
-            .filter(|t| t.iter().any(|x| x.is_finite()))
-            .map(|t| ("brake_torque_nm", t.clone()))
-    });
-    let brake = brake.map(|(column, values)| clean(name, column, time, &values, &mut faults));
+}
 
-    let finite = |k: usize| omega[k].is_finite() && v[k].is_finite() && load[k].is_finite();
-    let continuous = stretches(finite, &breaks, 3);
-    let omega_sigma = difference_sigma(&omega);
-    let v_sigma = difference_sigma(&v);
-    let load_sigma = difference_sigma(&load);
-    // No window may average over more than a sixth of a wheel revolution on either side.
-    let reach: Vec<f64> = (0..n)
-        .map(|k| {
-            let revolution = core::f64::consts::TAU / omega[k].abs().max(1.0);
-            let reach = MAX_REACH_S.min(revolution / 6.0).max(2.2 * typical_dt);
-            (reach_factor * reach).max(LEAST_REACH * typical_dt)
-        })
-        .collect();
-    let slow = (2.0 * MAX_REACH_S).max(4.2 * typical_dt);
-    let slow_reach: Vec<f64> = vec![(reach_factor * slow).max(LEAST_REACH * typical_dt); n];
-    let wheel = channel(time, omega, &continuous, omega_sigma, &reach);
-    let speed = channel(time, v, &continuous, v_sigma, &slow_reach);
-    let load = channel(time, load, &continuous, load_sigma, &reach);
-    let torque = brake.map(|(values, ok)| {
-        let sigma = difference_sigma(&values);
-        let finite_stretches = stretches(|k| values[k].is_finite(), &breaks, 3);
-        (channel(time, values, &finite_stretches, sigma, &reach), ok)
-    });
-    let (drag_sigma, drag_smooth) = if has_drag {
-        let sigma = difference_sigma(&drag);
-        let finite_stretches = stretches(|k| drag[k].is_finite(), &breaks, 3);
-        (
-            sigma,
-            smooth(time, &drag, &finite_stretches, sigma, &reach).value,
-        )
-    } else {
-        (0.0, Vec::new())
-    };
+/// A drag channel frozen at its own extreme clips: that is the channel's physics (`force_saturation`), reported as a
+/// fault of the data but kept for the fit.
+fn keep_clipped(recorded: &[f64], drag: &[f64], usable: &mut [bool]) {
+    let largest = drag.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    for ((usable, recorded), drag) in usable.iter_mut().zip(recorded).zip(drag) {
+        let clipped = recorded.is_finite() && *drag >= largest * (1.0 - 1e-9) && largest > 0.0;
+        *usable |= clipped;
+    }
+}
 
-    let mut loads: Vec<f64> = load
-        .smooth
-        .iter()
-        .copied()
-        .filter(|x| x.is_finite())
-        .collect();
+/// Brake torque by column: the commanded pressure's where there is one, else as recorded.
+fn brake(rig: &Rig, run: &Run) -> Option<(&'static str, Vec<f64>)> {
+    let known = |x: &&Vec<f64>| x.iter().any(|x| x.is_finite());
+    let pressure = run.brake_pressure_pa.as_ref().filter(known);
+    if let (Some(pressure), Some(gain)) = (pressure, rig.torque_per_pressure_nm_pa) {
+        let torque = pressure.iter().map(|x| x * gain).collect();
+        return Some(("brake_pressure_pa", torque));
+    }
+    let torque = run.brake_torque_nm.as_ref().filter(known)?;
+    Some(("brake_torque_nm", torque.clone()))
+}
+
+/// Another column, cleaned; told of is only one that says nothing at all.
+fn extra(run: &Run, wanted: &str, faults: &mut Vec<DataFault>) -> Vec<f64> {
+    let Some((column, values)) = run.extra.iter().find(|(column, _)| column == wanted) else {
+        return vec![f64::NAN; run.time_s.len()];
+    };
+    let mut own = Vec::new();
+    let (x, _) = clean(&run.name, column, &run.time_s, values, &mut own);
+    faults.extend(own.into_iter().filter(|f| f.what.contains("all values")));
+    x
+}
+
+/// Where the wheel stands still and where it rolls.
+fn classify(series: &mut Series, rig: &Rig) {
+    let (wheel, speed, load) = (&series.wheel, &series.speed, &series.load);
+    let mut loads: Vec<f64> = load.smooth.clone();
+    loads.retain(|x| x.is_finite());
     let minimum_load = MIN_LOAD_SHARE * median_in_place(&mut loads).abs();
-    let still: Vec<bool> = (0..n)
-        .map(|k| {
-            let slow = 0.02_f64
-                .max(3.0 * v_sigma * speed.variance_share[k].sqrt())
-                .min(0.2);
-            speed.smooth[k].abs() < slow
-                && wheel.smooth[k].abs() * rig.radius_m < slow.max(3.0 * omega_sigma * rig.radius_m)
-        })
-        .collect();
-    let rolling: Vec<bool> = (0..n)
-        .map(|k| {
-            speed.smooth[k] >= MIN_SPEED && load.smooth[k] >= minimum_load && load.smooth[k] > 0.0
-        })
-        .collect();
+    let still = |k: usize| {
+        let slow = 0.02_f64
+            .max(3.0 * speed.sigma * speed.variance_share[k].sqrt())
+            .min(0.2);
+        speed.smooth[k].abs() < slow
+            && wheel.smooth[k].abs() * rig.radius_m < slow.max(3.0 * wheel.sigma * rig.radius_m)
+    };
+    let rolling = |k: usize| {
+        speed.smooth[k] >= MIN_SPEED && load.smooth[k] >= minimum_load && load.smooth[k] > 0.0
+    };
+    let samples = 0..series.time.len();
+    (series.still, series.rolling) = samples.map(|k| (still(k), rolling(k))).unzip();
+}
+
+/// Whether each sample of a channel may be used.
+struct Sound {
+    wheel: Vec<bool>,
+    speed: Vec<bool>,
+    load: Vec<bool>,
+    drag: Vec<bool>,
+    /// Empty where there is no brake column.
+    brake: Vec<bool>,
+}
+
+/// The stretches in which each balance can be formed.
+fn form_balances(series: &mut Series, rig: &Rig, sound: &Sound, breaks: &[bool]) {
+    let (wheel, speed) = (&series.wheel.smooth, &series.speed.smooth);
+    let load = &series.load.smooth;
     let slip_sane = |k: usize| {
-        let v = speed.smooth[k];
-        let s = (v - rig.radius_m * wheel.smooth[k]) / v;
+        let v = speed[k];
+        let s = (v - rig.radius_m * wheel[k]) / v;
         (-0.3..=1.3).contains(&s)
     };
     let base_ok = |k: usize| {
-        finite_at(&wheel.smooth, &speed.smooth, &load.smooth, k) && omega_ok[k] && v_ok[k]
+        let finite = wheel[k].is_finite() && speed[k].is_finite() && load[k].is_finite();
+        finite && sound.wheel[k] && sound.speed[k]
     };
-    let tyre = stretches(
-        |k| base_ok(k) && load_ok[k] && drag_ok[k] && (still[k] || (rolling[k] && slip_sane(k))),
-        &breaks,
-        10,
-    );
-    let wheel_balance = match &torque {
-        Some((t, ok)) => stretches(
-            |k| {
-                base_ok(k) && drag_ok[k] && ok[k] && t.smooth[k].is_finite() && speed.smooth[k] >= MIN_SPEED
-                // A locked wheel's brake torque is whatever holds it: the balance says nothing.
-                && wheel.smooth[k].abs() * rig.radius_m > 0.02 * speed.smooth[k]
-            },
-            &breaks,
-            10,
-        ),
-        None => Vec::new(),
-    };
+    let formed = |ok: &dyn Fn(usize) -> bool| stretches(ok, breaks, 10);
+    let tyre = formed(&|k| {
+        let known = series.still[k] || (series.rolling[k] && slip_sane(k));
+        base_ok(k) && sound.load[k] && sound.drag[k] && known
+    });
+    let wheel_balance = series.torque.as_ref().map_or(Vec::new(), |torque| {
+        formed(&|k| {
+            // A locked wheel's brake torque is whatever holds it: the balance says nothing.
+            let turning = wheel[k].abs() * rig.radius_m > 0.02 * speed[k];
+            let known = sound.drag[k] && sound.brake[k] && torque.smooth[k].is_finite();
+            base_ok(k) && known && speed[k] >= MIN_SPEED && turning
+        })
+    });
     let vehicle_balance = if rig.coasting {
-        stretches(
-            |k| base_ok(k) && drag_ok[k] && speed.smooth[k] >= MIN_SPEED,
-            &breaks,
-            10,
-        )
+        formed(&|k| base_ok(k) && sound.drag[k] && speed[k] >= MIN_SPEED)
     } else {
         Vec::new()
     };
-    let mut distance = vec![0.0; n];
-    let mut angle = vec![0.0; n];
-    for k in 1..n {
-        let step = |c: &[f64]| {
-            let mean = 0.5 * (c[k] + c[k - 1]);
-            if mean.is_finite() { mean * dt[k] } else { 0.0 }
-        };
-        distance[k] = distance[k - 1] + step(&speed.smooth);
-        angle[k] = angle[k - 1] + step(&wheel.smooth);
-    }
-    let extra = extra_names
-        .iter()
-        .map(|wanted| {
-            run.extra
-                .iter()
-                .find(|(column, _)| column == wanted)
-                .map_or_else(
-                    || vec![f64::NAN; n],
-                    |(column, values)| {
-                        let mut quiet = Vec::new();
-                        let (x, _) = clean(name, column, time, values, &mut quiet);
-                        faults.extend(quiet.into_iter().filter(|f| f.what.contains("all values")));
-                        x
-                    },
-                )
-        })
-        .collect();
-    let wheel_smoothing = turn::smoothing(&angle, &wheel.raw, &wheel.smooth, &rolling);
-    let series = Series {
-        name: run.name.clone(),
-        time: time.clone(),
-        dt,
-        typical_dt,
-        wheel,
-        speed,
-        load,
-        drag,
-        drag_smooth,
-        drag_sigma,
-        beside_law: Vec::new(),
-        torque: torque.map(|(c, _)| c),
-        distance,
-        angle,
-        wheel_smoothing,
-        still,
-        rolling,
-        tyre,
-        wheel_balance,
-        vehicle_balance,
-        extra,
-        index,
-    };
-    (series, faults)
+    series.tyre = tyre;
+    series.wheel_balance = wheel_balance;
+    series.vehicle_balance = vehicle_balance;
 }
 
-fn finite_at(a: &[f64], b: &[f64], c: &[f64], k: usize) -> bool {
-    a[k].is_finite() && b[k].is_finite() && c[k].is_finite()
+/// What a rate has come to since the first sample.
+fn travelled(rate: &[f64], dt: &[f64]) -> Vec<f64> {
+    let mut sum = 0.0;
+    (0..rate.len())
+        .map(|k| {
+            if k > 0 {
+                let mean = 0.5 * (rate[k] + rate[k - 1]);
+                sum += if mean.is_finite() { mean * dt[k] } else { 0.0 };
+            }
+            sum
+        })
+        .collect()
 }

@@ -5,13 +5,13 @@ use rayon::prelude::*;
 use super::dependence::{Dependence, width};
 use super::gram::Columns;
 use super::noise::Slopes;
-use super::rows::{Rows, Triple, quiet_force, rows, rows_of};
+use super::nuisances::nuisances;
+use super::rows::{Rows, Triple, rows, rows_of};
 use crate::correction::Levers;
 use crate::data::{Data, WIDTH};
-use crate::mechanism::{Balance, Id, Residuals, Search};
+use crate::mechanism::{Id, Residuals, Search};
 use crate::model::{Model, Term};
-use crate::number::{Dual, Number, finite_or_zero};
-use crate::prepare::mean_twice_about;
+use crate::number::{Dual, Number};
 
 /// A mechanism at one place of its nonlinear parameters, or a free dependence.
 #[derive(Clone, Debug)]
@@ -86,233 +86,6 @@ pub fn slopes_in(data: &Data, model: &Model, run: usize, which: &[usize]) -> Vec
     out
 }
 
-/// Second derivative of a smoothed channel from its rate.
-fn second(rate: &[f64], time: &[f64]) -> Vec<f64> {
-    let n = rate.len();
-    (0..n)
-        .map(|k| {
-            let (a, b) = (k.saturating_sub(2), (k + 2).min(n - 1));
-            let d = (rate[b] - rate[a]) / (time[b] - time[a]).max(1e-9);
-            finite_or_zero(d)
-        })
-        .collect()
-}
-
-/// Shortest lateness of a vehicle speed in s of which the shape matters: poles or a mere delay.
-const LEAST_POLE_S: f64 = 5e-3;
-
-/// What an impulse gains where a channel is late by so many equal poles and was taken to be late by a delay, in N s:
-/// the force through the poles, brought forward by their delay, less the force, over time.
-fn poles_for_delay(time: &[f64], dt: &[f64], force: &[f64], late: f64, poles: usize) -> Vec<f64> {
-    let mut passed = force.to_vec();
-    for _ in 0..poles {
-        let mut out = passed.first().copied().unwrap_or(0.0);
-        for (x, dt) in passed.iter_mut().zip(dt) {
-            out += (1.0 - (-dt * poles as f64 / late).exp()) * (*x - out);
-            *x = out;
-        }
-    }
-    let early = at_times(time, &passed, late);
-    let mut sum = 0.0;
-    early
-        .iter()
-        .zip(force)
-        .zip(dt)
-        .map(|((early, force), dt)| {
-            sum += (early - force) * dt.min(0.1);
-            sum
-        })
-        .collect()
-}
-
-/// A column at so many s after each sample, the last value beyond its end.
-fn at_times(time: &[f64], x: &[f64], after: f64) -> Vec<f64> {
-    let last = time.len().saturating_sub(1);
-    let mut at = 0;
-    time.iter()
-        .map(|t| {
-            while at < last && time[at + 1] < t + after {
-                at += 1;
-            }
-            let next = (at + 1).min(last);
-            let span = time[next] - time[at];
-            let share = if span > 0.0 {
-                ((t + after - time[at]) / span).clamp(0.0, 1.0)
-            } else {
-                0.0
-            };
-            x[at] + share * (x[next] - x[at])
-        })
-        .collect()
-}
-
-/// Columns of the measuring chain's nuisances on one run, with the prior standard deviations of their coefficients.
-fn nuisances(data: &Data, slopes: &Slopes, run: usize) -> Vec<(f64, Triple)> {
-    let s = &data.series[run];
-    let n = s.len();
-    let (inertia, mass) = (data.context.inertia, data.context.mass);
-    let wheel_rate: Vec<f64> = s.wheel.rate.iter().map(|x| finite_or_zero(*x)).collect();
-    let speed_rate: Vec<f64> = s.speed.rate.iter().map(|x| finite_or_zero(*x)).collect();
-    let wheel_second = second(&wheel_rate, &s.time);
-    let speed_second = second(&speed_rate, &s.time);
-    let column = |b: Balance, f: &dyn Fn(usize) -> f64| -> Vec<f64> {
-        if s.segments(b).is_empty() {
-            Vec::new()
-        } else {
-            (0..n).map(|k| finite_or_zero(f(k))).collect()
-        }
-    };
-    let of_tyre = |f: &dyn Fn(usize) -> f64| -> Triple {
-        [
-            column(Balance::Tyre, f),
-            column(Balance::Wheel, &|_| 0.0),
-            column(Balance::Vehicle, &|_| 0.0),
-        ]
-    };
-    let by_wheel = |u: &dyn Fn(usize) -> f64| -> Triple {
-        [
-            column(Balance::Tyre, &|k| -slopes.wheel[run][k] * u(k)),
-            column(Balance::Wheel, &|k| inertia * u(k)),
-            column(Balance::Vehicle, &|_| 0.0),
-        ]
-    };
-    let by_speed = |u: &dyn Fn(usize) -> f64| -> Triple {
-        [
-            column(Balance::Tyre, &|k| -slopes.speed[run][k] * u(k)),
-            column(Balance::Wheel, &|_| 0.0),
-            column(Balance::Vehicle, &|k| mass * u(k)),
-        ]
-    };
-    let mean = data.context.mean_wheel_speed;
-    // Zero-phase: what inputs and reading differ by in bandwidth, and what smoothing leaves of the slip's noise.
-    let by_force = |reach: f64| -> Triple {
-        // As the readings say it: a lag that filters their noise must find that done already.
-        let mut force = slopes.force[run].clone();
-        for (force, beside) in force.iter_mut().zip(&s.beside_law) {
-            *force -= beside;
-        }
-        let mean = mean_twice_about(&s.time, &force, &s.tyre, reach);
-        of_tyre(&|k| force[k] - mean[k])
-    };
-    // A mean over noisy slip is not the law at the mean slip: half its second derivative times the noise's variance.
-    let by_curvature = || -> Triple {
-        let radius = data.context.radius;
-        let curve = |k: usize| {
-            if !s.rolling[k] {
-                return 0.0;
-            }
-            let noise = (radius / s.speed.smooth[k] * s.wheel.sigma).powi(2)
-                + (radius * s.wheel.smooth[k] / s.speed.smooth[k].powi(2) * s.speed.sigma).powi(2);
-            -0.5 * slopes.curvature[run][k] * noise
-        };
-        of_tyre(&curve)
-    };
-    // The same of a slip that moves within a window of a sensor or of the smoother: half the second derivative times
-    // the rate's square, by the window's variance in s².
-    let by_motion = || -> Triple {
-        let radius = data.context.radius;
-        let curve = |k: usize| {
-            if !s.rolling[k] {
-                return 0.0;
-            }
-            let (v, omega) = (s.speed.smooth[k], s.wheel.smooth[k]);
-            let rate = radius * (omega * speed_rate[k] / (v * v) - wheel_rate[k] / v);
-            -0.5 * slopes.curvature[run][k] * rate * rate
-        };
-        of_tyre(&curve)
-    };
-    // The same of brake and drag where they are integrated.
-    let by_integral = |reach: f64, brake: bool| -> Triple {
-        let segments = if s.wheel_balance.is_empty() {
-            &s.vehicle_balance
-        } else {
-            &s.wheel_balance
-        };
-        // A lag of the brake filters its reading's noise, and must find that done already; nothing does that to the drag's.
-        let x = match (&s.torque, brake) {
-            (_, false) => quiet_force(s, &slopes.force[run]),
-            (Some(torque), true) => torque.smooth.clone(),
-            (None, true) => vec![0.0; n],
-        };
-        let mean = mean_twice_about(&s.time, &x, segments, reach);
-        let mut sum = 0.0;
-        let level: Vec<f64> = (0..n)
-            .map(|k| {
-                let d = (x[k] - mean[k]) * s.dt[k].min(0.1);
-                if d.is_finite() {
-                    sum += d;
-                }
-                sum
-            })
-            .collect();
-        let lever = if brake { 1.0 } else { -data.context.radius };
-        [
-            column(Balance::Tyre, &|_| 0.0),
-            column(Balance::Wheel, &|k| lever * level[k]),
-            column(Balance::Vehicle, &|k| if brake { 0.0 } else { level[k] }),
-        ]
-    };
-    let by_poles = |poles: usize| -> Triple {
-        let late = data.vehicle_late;
-        let level = if late > LEAST_POLE_S && !s.vehicle_balance.is_empty() {
-            let force = quiet_force(s, &slopes.force[run]);
-            let force: Vec<f64> = force.into_iter().map(finite_or_zero).collect();
-            poles_for_delay(&s.time, &s.dt, &force, late, poles)
-        } else {
-            vec![0.0; n]
-        };
-        [
-            column(Balance::Tyre, &|_| 0.0),
-            column(Balance::Wheel, &|_| 0.0),
-            column(Balance::Vehicle, &|k| level[k]),
-        ]
-    };
-    let torque = |k: usize| s.torque.as_ref().map_or(0.0, |t| t.smooth[k]);
-    vec![
-        // Wheel speed late.
-        (data.timing_std.wheel, by_wheel(&|k| wheel_rate[k])),
-        // Vehicle speed late.
-        (data.timing_std.vehicle, by_speed(&|k| speed_rate[k])),
-        // Brake late.
-        (
-            data.timing_std.brake,
-            [
-                column(Balance::Tyre, &|_| 0.0),
-                column(Balance::Wheel, &torque),
-                column(Balance::Vehicle, &|_| 0.0),
-            ],
-        ),
-        // Wheel speed late by turn.
-        (
-            0.001,
-            by_wheel(&|k| wheel_rate[k] * mean / s.wheel.smooth[k].abs().max(0.1 * mean)),
-        ),
-        // Force smoothed, 6 ms.
-        (4.0, by_force(0.006)),
-        // Force smoothed, 20 ms.
-        (3.0, by_force(0.02)),
-        // Force smoothed, 60 ms.
-        (1.0, by_force(0.06)),
-        // Brake smoothed, 6 ms.
-        (4.0, by_integral(0.006, true)),
-        // Brake smoothed, 20 ms.
-        (3.0, by_integral(0.02, true)),
-        // Drag smoothed, 20 ms.
-        (3.0, by_integral(0.02, false)),
-        // Law's curvature under slip noise.
-        (1.0, by_curvature()),
-        // Law's curvature under moving slip.
-        (1e-4, by_motion()),
-        // Vehicle speed low-passed.
-        (3e-3, by_speed(&|k| -0.5 * speed_second[k])),
-        // Vehicle speed late by one pole, by two, instead of by a delay.
-        (1.0, by_poles(1)),
-        (1.0, by_poles(2)),
-        // Wheel speed low-passed.
-        (3e-4, by_wheel(&|k| -0.5 * wheel_second[k])),
-    ]
-}
-
 /// All columns of a campaign about a model.
 #[must_use]
 pub fn table(
@@ -325,10 +98,10 @@ pub fn table(
     wanted: &dyn Fn(Id) -> bool,
 ) -> Table {
     let runs = data.series.len();
-    let base: Vec<usize> = vec![0, 1];
-    let own: Vec<usize> = (model.base.len()..model.vector().len()).collect();
-    let mut fixed: Vec<usize> = base.clone();
-    fixed.extend(&own);
+    let fixed: Vec<usize> = [0, 1]
+        .into_iter()
+        .chain(model.base.len()..model.vector().len())
+        .collect();
     let levers = (extra.len() + free.len() > 0).then(|| Levers::new(data, model));
     let columns_of = |dependence: &Dependence, run: usize| {
         let levers = levers.as_ref();
@@ -346,86 +119,91 @@ pub fn table(
         })
         .collect();
     let here: Vec<Triple> = per_run.iter().map(|(all, _)| all[0].clone()).collect();
-    let mut columns: [Vec<Columns>; 3] = core::array::from_fn(|_| vec![Vec::new(); runs]);
-    let mut listed = Vec::new();
+    let mut table = Table {
+        columns: core::array::from_fn(|_| vec![Vec::new(); runs]),
+        base: fixed.len() + width(extra),
+        free: width(extra),
+        nuisances: per_run
+            .first()
+            .map_or(Vec::new(), |(_, own)| own.iter().map(|n| n.0).collect()),
+        candidates: Vec::new(),
+    };
     for (run, (fixed, nuisance)) in per_run.into_iter().enumerate() {
-        for triple in fixed.into_iter().chain(nuisance.into_iter().map(|(n, t)| {
-            if run == 0 {
-                listed.push(n);
-            }
-            t
-        })) {
+        let nuisance = nuisance.into_iter().map(|(_, triple)| triple);
+        table.enter(data, run, fixed.into_iter().chain(nuisance));
+    }
+    let starts = starts(data, model, evidence, wanted);
+    let made: Vec<Option<Own>> = starts
+        .par_iter()
+        .map(|(entry, start)| column_of(data, model, *entry, start, &here))
+        .collect();
+    for ((entry, start), made) in starts.into_iter().zip(made) {
+        if let Some((free, by_run)) = made {
+            let id = data.catalogue.get(entry).id();
+            table.offer(data, Some((entry, id)), start, free, by_run);
+        }
+    }
+    for dependence in free {
+        let own = (0..dependence.width()).collect();
+        let by_run = (0..runs).map(|run| columns_of(dependence, run)).collect();
+        table.offer(data, None, Vec::new(), own, by_run);
+    }
+    table
+}
+
+impl Table {
+    /// Enters columns of one run, as means over its blocks.
+    fn enter(&mut self, data: &Data, run: usize, triples: impl IntoIterator<Item = Triple>) {
+        for triple in triples {
             for (b, column) in triple.into_iter().enumerate() {
-                columns[b][run].push(data.blocks[run][b].mean(&column));
+                self.columns[b][run].push(data.blocks[run][b].mean(&column));
             }
         }
     }
+
+    /// Enters a candidate behind the last one.
+    fn offer(
+        &mut self,
+        data: &Data,
+        mechanism: Option<(usize, Id)>,
+        start: Vec<f64>,
+        free: Vec<usize>,
+        by_run: Vec<Vec<Triple>>,
+    ) {
+        let from = self.candidates.last().map_or(0, |c| c.columns.end);
+        let width = by_run.first().map_or(0, Vec::len);
+        for (run, triples) in by_run.into_iter().enumerate() {
+            self.enter(data, run, triples);
+        }
+        self.candidates.push(Candidate {
+            entry: mechanism.map(|(entry, _)| entry),
+            id: mechanism.map(|(_, id)| id),
+            start,
+            free,
+            columns: from..from + width,
+        });
+    }
+}
+
+/// Where a search may start for each mechanism that is wanted and not in the model.
+fn starts(
+    data: &Data,
+    model: &Model,
+    residuals: &[Residuals],
+    wanted: &dyn Fn(Id) -> bool,
+) -> Vec<(usize, Vec<f64>)> {
     let search = Search {
         context: &data.context,
         series: &data.series,
-        residuals: evidence,
+        residuals,
     };
-    let entries: Vec<(usize, Vec<f64>)> = data
-        .catalogue
+    data.catalogue
         .entries()
         .iter()
         .enumerate()
         .filter(|(entry, m)| wanted(m.id()) && !model.terms.iter().any(|t| t.entry == *entry))
         .flat_map(|(entry, m)| m.starts(&search).into_iter().map(move |s| (entry, s)))
-        .collect();
-    let made: Vec<Option<Own>> = entries
-        .par_iter()
-        .map(|(entry, start)| column_of(data, model, *entry, start, &here))
-        .collect();
-    let mut candidates = Vec::new();
-    let mut at = 0;
-    for ((entry, start), made) in entries.into_iter().zip(made) {
-        let Some((free, triples)) = made else {
-            continue;
-        };
-        let width = triples[0].len();
-        for (run, triples) in triples.into_iter().enumerate() {
-            for triple in triples {
-                for (b, column) in triple.into_iter().enumerate() {
-                    columns[b][run].push(data.blocks[run][b].mean(&column));
-                }
-            }
-        }
-        candidates.push(Candidate {
-            entry: Some(entry),
-            id: Some(data.catalogue.get(entry).id()),
-            start,
-            free,
-            columns: at..at + width,
-        });
-        at += width;
-    }
-    for dependence in free {
-        let width = dependence.width();
-        let by_run = (0..runs).map(|run| columns_of(dependence, run));
-        for (run, triples) in by_run.enumerate() {
-            for triple in triples {
-                for (b, column) in triple.iter().enumerate() {
-                    columns[b][run].push(data.blocks[run][b].mean(column));
-                }
-            }
-        }
-        candidates.push(Candidate {
-            entry: None,
-            id: None,
-            start: Vec::new(),
-            free: (0..width).collect(),
-            columns: at..at + width,
-        });
-        at += width;
-    }
-    Table {
-        columns,
-        base: fixed.len() + width(extra),
-        free: width(extra),
-        nuisances: listed,
-        candidates,
-    }
+        .collect()
 }
 
 /// Columns of one mechanism at one start, by run; `None` where it changes nothing.
@@ -479,34 +257,4 @@ fn column_of(
         .map(|run| free.iter().map(|i| run[*i].clone()).collect())
         .collect();
     Some((free, kept))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_step_through_a_pole_ahead_of_its_delay_leaves_what_has_not_passed_yet() {
-        let (step, late, size) = (1e-4, 0.05, 300.0);
-        let time: Vec<f64> = (0..4000).map(|k| f64::from(k) * step).collect();
-        let dt = vec![step; time.len()];
-        let from = 0.1;
-        let force: Vec<f64> = time
-            .iter()
-            .map(|t| if *t >= from { size } else { 0.0 })
-            .collect();
-        let found = poles_for_delay(&time, &dt, &force, late, 1);
-        // From the step on: size late exp(-(t - from + late) / late).
-        for k in [1000, 1300, 2000, 3000] {
-            let expected = size * late * (-(time[k] - from + late) / late).exp();
-            assert!(
-                (found[k] - expected).abs() < 0.01 * size * late,
-                "{k}: {} {expected}",
-                found[k]
-            );
-        }
-        // Whatever the number of poles, in the end all of the impulse has passed.
-        let two = poles_for_delay(&time, &dt, &force, late, 2);
-        assert!(two[3400].abs() < 0.01 * size * late, "{}", two[3400]);
-    }
 }

@@ -7,6 +7,7 @@ pub mod estimate;
 pub mod gram;
 pub mod hypothesis;
 pub mod noise;
+mod nuisances;
 pub mod rows;
 pub mod screen;
 pub mod slip;

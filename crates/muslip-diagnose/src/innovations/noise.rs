@@ -7,6 +7,7 @@ use crate::data::Data;
 use crate::mechanism::Balance;
 use crate::model::{Model, friction};
 use crate::number::finite_or_zero;
+use crate::series::Series;
 
 /// Memory in s of the wheel speed's noise in the slip: so many of the smoother's windows, within bounds.
 const WINDOWS: f64 = 1.5;
@@ -133,129 +134,171 @@ fn integral(dt: &[f64], x: &[f64]) -> Vec<f64> {
 /// The parts of every balance that can be formed, at their starting sizes.
 #[must_use]
 pub fn parts(data: &Data, slopes: &Slopes) -> Vec<BalanceParts> {
-    let s = &data.series;
-    let sigma = |f: &dyn Fn(&crate::series::Series) -> f64| median(s.iter().map(f));
-    let dt = data.context.dt;
-    let drag = sigma(&|s| s.drag_sigma).max(1e-6 * data.context.max_drag);
-    let wheel = sigma(&|s| s.wheel.sigma).max(1e-6 * data.context.mean_wheel_speed);
-    let speed = sigma(&|s| s.speed.sigma).max(1e-6 * data.context.mean_speed);
-    let colour = data.vehicle_colour.unwrap_or(Colour {
-        std: 0.0,
-        time: VEHICLE_MEMORY_S,
-    });
-    let coloured = colour.std.max(0.3 * speed);
-    // What a filter has passed goes smoothly, which no noise that forgets does: a force would have to.
-    let slow = if data.vehicle_filtered && data.vehicle_colour.is_some() {
-        Kind::Filtered(colour.time)
-    } else {
-        Kind::Forgetting(colour.time)
-    };
-    let torque = sigma(&|s| s.torque.as_ref().map_or(0.0, |t| t.sigma));
-    // White noise that the smoother has passed remembers about as long as its window.
-    let share = sigma(&|s| median(s.wheel.variance_share.iter().copied())).max(1e-3);
-    let smoothed = (WINDOWS * dt / share).clamp(SHORTEST_MEMORY_S, LONGEST_MEMORY_S);
-    let none: Vec<Vec<f64>> = vec![Vec::new(); s.len()];
-    let averaged = |balance: Balance, gain: &[Vec<f64>]| -> Vec<Vec<f64>> {
-        gain.iter()
-            .zip(&data.blocks)
-            .map(|(g, blocks)| blocks[balance as usize].mean(g))
-            .collect()
-    };
-    let source = |name, kind, gain: &Vec<Vec<f64>>, std: f64, cap: f64| Source {
-        name,
-        kind,
-        gain: gain.clone(),
-        log_std: std.max(1e-12).ln(),
-        log_start: std.max(1e-12).ln(),
-        log_cap: cap.max(1e-12).ln(),
-        of_slip: false,
-    };
-    let of_slip = |source: Source| Source {
-        of_slip: true,
-        ..source
-    };
-    let friction = 1.0;
-    let (radius, inertia, mass) = (data.context.radius, data.context.inertia, data.context.mass);
-    let force = data.context.max_drag;
-    let time: Vec<Vec<f64>> = s
-        .iter()
-        .map(|s| s.time.iter().map(|t| t - s.time[0]).collect())
-        .collect();
-    // Of the law, for the reading's own noise, integrated, is the walk: scaling it would buy the walk away.
-    let impulse: Vec<Vec<f64>> = s
-        .iter()
-        .zip(&slopes.force)
-        .map(|(s, law)| integral(&s.dt, &quiet_force(s, law)))
-        .collect();
-    let mut all = Vec::new();
-    if data.forms(Balance::Tyre) {
-        all.push(BalanceParts {
-            balance: Balance::Tyre,
-            sources: vec![
-                source("white", None, &none, drag, f64::INFINITY),
-                of_slip(source(
-                    "wheel speed",
-                    Some(Kind::Forgetting(smoothed)),
-                    &slopes.wheel,
-                    0.5 * wheel,
-                    f64::INFINITY,
-                )),
-                of_slip(source(
-                    "vehicle speed",
-                    Some(Kind::Forgetting(colour.time)),
-                    &slopes.speed,
-                    coloured,
-                    f64::INFINITY,
-                )),
-                source(
-                    "drag, coloured",
-                    Some(Kind::Forgetting(0.07)),
-                    &none,
-                    0.1 * drag,
-                    f64::INFINITY,
-                ),
-                source(
-                    "friction, fast",
-                    Some(Kind::Forgetting(0.03)),
-                    &slopes.force,
-                    0.003 * friction,
-                    f64::INFINITY,
-                ),
-                source(
-                    "friction, slow",
-                    Some(Kind::Forgetting(0.6)),
-                    &slopes.force,
-                    0.001 * friction,
-                    0.003,
-                ),
-                source(
-                    "friction of a run",
-                    Some(Kind::Constant),
-                    &slopes.force,
-                    0.002,
-                    0.005,
-                ),
-                source(
-                    "zero of a run",
-                    Some(Kind::Constant),
-                    &none,
-                    0.1 * drag,
-                    0.002 * force,
-                ),
-                source(
-                    "slip of a run",
-                    Some(Kind::Constant),
-                    &slopes.slip,
-                    1e-4,
-                    5e-4,
-                ),
-            ],
+    let sensors = Sensors::new(data, slopes);
+    [Balance::Tyre, Balance::Wheel, Balance::Vehicle]
+        .into_iter()
+        .filter(|balance| data.forms(*balance))
+        .map(|balance| {
+            let sources = match balance {
+                Balance::Tyre => sensors.tyre(),
+                Balance::Wheel => sensors.wheel(),
+                Balance::Vehicle => sensors.vehicle(),
+            };
+            by_blocks(data, balance, sources)
+        })
+        .collect()
+}
+
+/// Parts as they enter means over blocks.
+fn by_blocks(data: &Data, balance: Balance, mut sources: Vec<Source>) -> BalanceParts {
+    // A mean of so many readings holds so much less of their own noise.
+    let blocks = data.blocks.iter().map(|b| &b[balance as usize].samples);
+    let (count, samples) = blocks
+        .flatten()
+        .fold((0.0, 0.0), |(count, samples), block| {
+            (count + 1.0, samples + block.len() as f64)
         });
-    }
-    if data.forms(Balance::Wheel) {
-        let turned: Vec<Vec<f64>> = s
+    let less = 0.5 * f64::ln(f64::max(samples, 1.0) / f64::max(count, 1.0));
+    for source in &mut sources {
+        source.gain = source
+            .gain
             .iter()
-            .zip(&impulse)
+            .zip(&data.blocks)
+            .map(|(gain, blocks)| blocks[balance as usize].mean(gain))
+            .collect();
+        if source.kind.is_none() {
+            source.log_std -= less;
+            source.log_start -= less;
+        }
+    }
+    BalanceParts { balance, sources }
+}
+
+impl Source {
+    /// A part that starts at this standard deviation and may become as large as the data say.
+    fn new(name: &'static str, kind: Option<Kind>, gain: &[Vec<f64>], std: f64) -> Self {
+        Self {
+            name,
+            kind,
+            gain: gain.to_vec(),
+            log_std: std.max(1e-12).ln(),
+            log_start: std.max(1e-12).ln(),
+            log_cap: f64::INFINITY,
+            of_slip: false,
+        }
+    }
+
+    /// The same, of which the sensors make no more than this plausible.
+    fn at_most(self, std: f64) -> Self {
+        Self {
+            log_cap: std.max(1e-12).ln(),
+            ..self
+        }
+    }
+
+    /// The same as an error of the slip.
+    fn of_slip(self) -> Self {
+        Self {
+            of_slip: true,
+            ..self
+        }
+    }
+}
+
+/// What the sensors' noise is like, and by what it enters.
+struct Sensors<'a> {
+    data: &'a Data,
+    slopes: &'a Slopes,
+    /// Standard deviations of the readings' own noise.
+    drag: f64,
+    wheel: f64,
+    speed: f64,
+    torque: f64,
+    /// Memory in s of white noise that the smoother has passed: about as long as its window.
+    smoothed: f64,
+    /// Slow noise of the vehicle speed: its standard deviation, its memory in s.
+    coloured: f64,
+    colour_time: f64,
+    /// Gains of what enters as it is.
+    none: Vec<Vec<f64>>,
+    /// Time since the start of each run.
+    time: Vec<Vec<f64>>,
+    /// The law's force, for the reading's own noise, integrated, is the walk: scaling it would buy the walk away.
+    impulse: Vec<Vec<f64>>,
+}
+
+impl<'a> Sensors<'a> {
+    fn new(data: &'a Data, slopes: &'a Slopes) -> Self {
+        let s = &data.series;
+        let sigma = |f: &dyn Fn(&Series) -> f64| median(s.iter().map(f));
+        let speed = sigma(&|s| s.speed.sigma).max(1e-6 * data.context.mean_speed);
+        let colour = data.vehicle_colour.unwrap_or(Colour {
+            std: 0.0,
+            time: VEHICLE_MEMORY_S,
+        });
+        let share = sigma(&|s| median(s.wheel.variance_share.iter().copied())).max(1e-3);
+        Self {
+            data,
+            slopes,
+            drag: sigma(&|s| s.drag_sigma).max(1e-6 * data.context.max_drag),
+            wheel: sigma(&|s| s.wheel.sigma).max(1e-6 * data.context.mean_wheel_speed),
+            speed,
+            torque: sigma(&|s| s.torque.as_ref().map_or(0.0, |t| t.sigma)),
+            smoothed: (WINDOWS * data.context.dt / share)
+                .clamp(SHORTEST_MEMORY_S, LONGEST_MEMORY_S),
+            coloured: colour.std.max(0.3 * speed),
+            colour_time: colour.time,
+            none: vec![Vec::new(); s.len()],
+            time: s
+                .iter()
+                .map(|s| s.time.iter().map(|t| t - s.time[0]).collect())
+                .collect(),
+            impulse: s
+                .iter()
+                .zip(&slopes.force)
+                .map(|(s, law)| integral(&s.dt, &quiet_force(s, law)))
+                .collect(),
+        }
+    }
+
+    fn tyre(&self) -> Vec<Source> {
+        let (none, force) = (&self.none, &self.slopes.force);
+        let forgetting = |time_s| Some(Kind::Forgetting(time_s));
+        let of_a_run = Some(Kind::Constant);
+        vec![
+            Source::new("white", None, none, self.drag),
+            Source::new(
+                "wheel speed",
+                forgetting(self.smoothed),
+                &self.slopes.wheel,
+                0.5 * self.wheel,
+            )
+            .of_slip(),
+            Source::new(
+                "vehicle speed",
+                forgetting(self.colour_time),
+                &self.slopes.speed,
+                self.coloured,
+            )
+            .of_slip(),
+            Source::new("drag, coloured", forgetting(0.07), none, 0.1 * self.drag),
+            Source::new("friction, fast", forgetting(0.03), force, 0.003),
+            Source::new("friction, slow", forgetting(0.6), force, 0.001).at_most(0.003),
+            Source::new("friction of a run", of_a_run, force, 0.002).at_most(0.005),
+            Source::new("zero of a run", of_a_run, none, 0.1 * self.drag)
+                .at_most(0.002 * self.data.context.max_drag),
+            Source::new("slip of a run", of_a_run, &self.slopes.slip, 1e-4).at_most(5e-4),
+        ]
+    }
+
+    fn wheel(&self) -> Vec<Source> {
+        let (none, context) = (&self.none, &self.data.context);
+        let (radius, inertia) = (context.radius, context.inertia);
+        let turned: Vec<Vec<f64>> = self
+            .data
+            .series
+            .iter()
+            .zip(&self.impulse)
             .map(|(s, impulse)| {
                 let slowed = s.wheel.slow.iter().zip(impulse);
                 slowed
@@ -263,132 +306,79 @@ pub fn parts(data: &Data, slopes: &Slopes) -> Vec<BalanceParts> {
                     .collect()
             })
             .collect();
-        let walk = (radius * drag).hypot(torque) * dt.sqrt();
-        let level = inertia * wheel;
-        all.push(BalanceParts {
-            balance: Balance::Wheel,
-            sources: vec![
-                source("walk", Some(Kind::Walk), &none, walk, f64::INFINITY),
-                source("white", None, &none, level, f64::INFINITY),
-                source(
-                    "wheel speed, coloured",
-                    Some(Kind::Forgetting(0.02)),
-                    &none,
-                    0.3 * level,
-                    f64::INFINITY,
-                ),
-                source(
-                    "torque, fast",
-                    Some(Kind::Integrated(0.03)),
-                    &none,
-                    0.2 * walk / dt.sqrt(),
-                    f64::INFINITY,
-                ),
-                source(
-                    "torque, slow",
-                    Some(Kind::Integrated(0.3)),
-                    &none,
-                    0.03 * walk / dt.sqrt(),
-                    0.1 * walk / dt.sqrt(),
-                ),
-                source(
-                    "torque, drifting",
-                    Some(Kind::Integrated(3.0)),
-                    &none,
-                    0.01 * walk / dt.sqrt(),
-                    0.03 * walk / dt.sqrt(),
-                ),
-                source(
-                    "torque's scale of a run",
-                    Some(Kind::Constant),
-                    &turned,
-                    0.002,
-                    0.005,
-                ),
-                source(
-                    "torque's zero of a run",
-                    Some(Kind::Constant),
-                    &time,
-                    0.001 * force * radius,
-                    0.002 * force * radius,
-                ),
-            ],
-        });
+        let root = context.dt.sqrt();
+        let walk = (radius * self.drag).hypot(self.torque) * root;
+        let level = inertia * self.wheel;
+        let integrated = |time_s| Some(Kind::Integrated(time_s));
+        let of_a_run = Some(Kind::Constant);
+        vec![
+            Source::new("walk", Some(Kind::Walk), none, walk),
+            Source::new("white", None, none, level),
+            Source::new(
+                "wheel speed, coloured",
+                Some(Kind::Forgetting(0.02)),
+                none,
+                0.3 * level,
+            ),
+            Source::new("torque, fast", integrated(0.03), none, 0.2 * walk / root),
+            Source::new("torque, slow", integrated(0.3), none, 0.03 * walk / root)
+                .at_most(0.1 * walk / root),
+            Source::new(
+                "torque, drifting",
+                integrated(3.0),
+                none,
+                0.01 * walk / root,
+            )
+            .at_most(0.03 * walk / root),
+            Source::new("torque's scale of a run", of_a_run, &turned, 0.002).at_most(0.005),
+            Source::new(
+                "torque's zero of a run",
+                of_a_run,
+                &self.time,
+                0.001 * context.max_drag * radius,
+            )
+            .at_most(0.002 * context.max_drag * radius),
+        ]
     }
-    if data.forms(Balance::Vehicle) {
-        let walk = drag * dt.sqrt();
-        let level = mass * speed;
-        all.push(BalanceParts {
-            balance: Balance::Vehicle,
-            sources: vec![
-                source("walk", Some(Kind::Walk), &none, walk, f64::INFINITY),
-                source("white", None, &none, level, f64::INFINITY),
-                source(
-                    "vehicle speed, coloured",
-                    Some(slow),
-                    &none,
-                    mass * coloured,
-                    f64::INFINITY,
-                ),
-                source(
-                    "vehicle speed, windowed",
-                    Some(Kind::Forgetting(0.02)),
-                    &none,
-                    0.3 * level,
-                    f64::INFINITY,
-                ),
-                source(
-                    "force, slow",
-                    Some(Kind::Integrated(0.3)),
-                    &none,
-                    0.03 * walk / dt.sqrt(),
-                    0.2 * walk / dt.sqrt(),
-                ),
-                source(
-                    "force, drifting",
-                    Some(Kind::Integrated(3.0)),
-                    &none,
-                    0.01 * walk / dt.sqrt(),
-                    0.03 * walk / dt.sqrt(),
-                ),
-                source(
-                    "drag's scale of a run",
-                    Some(Kind::Constant),
-                    &impulse,
-                    0.002,
-                    0.005,
-                ),
-                source(
-                    "force of a run",
-                    Some(Kind::Constant),
-                    &time,
-                    0.001 * force,
-                    0.002 * force,
-                ),
-            ],
-        });
+
+    fn vehicle(&self) -> Vec<Source> {
+        let (none, context) = (&self.none, &self.data.context);
+        let (mass, force) = (context.mass, context.max_drag);
+        let root = context.dt.sqrt();
+        let walk = self.drag * root;
+        let level = mass * self.speed;
+        // What a filter has passed goes smoothly, which no noise that forgets does: a force would have to.
+        let slow = if self.data.vehicle_filtered && self.data.vehicle_colour.is_some() {
+            Kind::Filtered(self.colour_time)
+        } else {
+            Kind::Forgetting(self.colour_time)
+        };
+        let integrated = |time_s| Some(Kind::Integrated(time_s));
+        let of_a_run = Some(Kind::Constant);
+        vec![
+            Source::new("walk", Some(Kind::Walk), none, walk),
+            Source::new("white", None, none, level),
+            Source::new(
+                "vehicle speed, coloured",
+                Some(slow),
+                none,
+                mass * self.coloured,
+            ),
+            Source::new(
+                "vehicle speed, windowed",
+                Some(Kind::Forgetting(0.02)),
+                none,
+                0.3 * level,
+            ),
+            Source::new("force, slow", integrated(0.3), none, 0.03 * walk / root)
+                .at_most(0.2 * walk / root),
+            Source::new("force, drifting", integrated(3.0), none, 0.01 * walk / root)
+                .at_most(0.03 * walk / root),
+            Source::new("drag's scale of a run", of_a_run, &self.impulse, 0.002).at_most(0.005),
+            Source::new("force of a run", of_a_run, &self.time, 0.001 * force)
+                .at_most(0.002 * force),
+        ]
     }
-    for parts in &mut all {
-        // A mean of so many readings holds so much less of their own noise.
-        let blocks = data
-            .blocks
-            .iter()
-            .map(|b| &b[parts.balance as usize].samples);
-        let (count, samples) = blocks
-            .flatten()
-            .fold((0.0, 0.0), |(count, samples), block| {
-                (count + 1.0, samples + block.len() as f64)
-            });
-        let less = 0.5 * f64::ln(f64::max(samples, 1.0) / f64::max(count, 1.0));
-        for source in &mut parts.sources {
-            source.gain = averaged(parts.balance, &source.gain);
-            if source.kind.is_none() {
-                source.log_std -= less;
-                source.log_start -= less;
-            }
-        }
-    }
-    all
 }
 
 impl BalanceParts {

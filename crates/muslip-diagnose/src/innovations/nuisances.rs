@@ -1,0 +1,309 @@
+//! Columns of the measuring chain's nuisances: what its channels may be late by or smoothed beyond what is known.
+
+use super::noise::Slopes;
+use super::rows::{Triple, quiet_force};
+use crate::data::Data;
+use crate::mechanism::Balance;
+use crate::number::finite_or_zero;
+use crate::prepare::mean_twice_about;
+use crate::series::Series;
+
+/// Second derivative of a smoothed channel from its rate.
+fn second(rate: &[f64], time: &[f64]) -> Vec<f64> {
+    let n = rate.len();
+    (0..n)
+        .map(|k| {
+            let (a, b) = (k.saturating_sub(2), (k + 2).min(n - 1));
+            let d = (rate[b] - rate[a]) / (time[b] - time[a]).max(1e-9);
+            finite_or_zero(d)
+        })
+        .collect()
+}
+
+/// Shortest lateness of a vehicle speed in s of which the shape matters: poles or a mere delay.
+const LEAST_POLE_S: f64 = 5e-3;
+
+/// What an impulse gains where a channel is late by so many equal poles and was taken to be late by a delay, in N s:
+/// the force through the poles, brought forward by their delay, less the force, over time.
+fn poles_for_delay(time: &[f64], dt: &[f64], force: &[f64], late: f64, poles: usize) -> Vec<f64> {
+    let mut passed = force.to_vec();
+    for _ in 0..poles {
+        let mut out = passed.first().copied().unwrap_or(0.0);
+        for (x, dt) in passed.iter_mut().zip(dt) {
+            out += (1.0 - (-dt * poles as f64 / late).exp()) * (*x - out);
+            *x = out;
+        }
+    }
+    let early = at_times(time, &passed, late);
+    let mut sum = 0.0;
+    early
+        .iter()
+        .zip(force)
+        .zip(dt)
+        .map(|((early, force), dt)| {
+            sum += (early - force) * dt.min(0.1);
+            sum
+        })
+        .collect()
+}
+
+/// A column at so many s after each sample, the last value beyond its end.
+fn at_times(time: &[f64], x: &[f64], after: f64) -> Vec<f64> {
+    let last = time.len().saturating_sub(1);
+    let mut at = 0;
+    time.iter()
+        .map(|t| {
+            while at < last && time[at + 1] < t + after {
+                at += 1;
+            }
+            let next = (at + 1).min(last);
+            let span = time[next] - time[at];
+            let share = if span > 0.0 {
+                ((t + after - time[at]) / span).clamp(0.0, 1.0)
+            } else {
+                0.0
+            };
+            x[at] + share * (x[next] - x[at])
+        })
+        .collect()
+}
+
+/// The chain on one run: what its columns are made of.
+struct Chain<'a> {
+    data: &'a Data,
+    series: &'a Series,
+    slopes: &'a Slopes,
+    run: usize,
+    /// Rates of the speeds, nothing where there are none.
+    wheel_rate: Vec<f64>,
+    speed_rate: Vec<f64>,
+}
+
+fn zero(_: usize) -> f64 {
+    0.0
+}
+
+impl<'a> Chain<'a> {
+    fn new(data: &'a Data, slopes: &'a Slopes, run: usize) -> Self {
+        let series = &data.series[run];
+        let finite = |rate: &[f64]| rate.iter().map(|x| finite_or_zero(*x)).collect();
+        Self {
+            data,
+            series,
+            slopes,
+            run,
+            wheel_rate: finite(&series.wheel.rate),
+            speed_rate: finite(&series.speed.rate),
+        }
+    }
+
+    /// What stands in each balance, sample by sample, where the balance is formed.
+    fn columns(
+        &self,
+        tyre: impl Fn(usize) -> f64,
+        wheel: impl Fn(usize) -> f64,
+        vehicle: impl Fn(usize) -> f64,
+    ) -> Triple {
+        let column = |balance: Balance, f: &dyn Fn(usize) -> f64| -> Vec<f64> {
+            if self.series.segments(balance).is_empty() {
+                return Vec::new();
+            }
+            let samples = 0..self.series.len();
+            samples.map(|k| finite_or_zero(f(k))).collect()
+        };
+        [
+            column(Balance::Tyre, &tyre),
+            column(Balance::Wheel, &wheel),
+            column(Balance::Vehicle, &vehicle),
+        ]
+    }
+
+    /// Where the wheel speed reads so much less.
+    fn by_wheel(&self, u: impl Fn(usize) -> f64) -> Triple {
+        let slope = &self.slopes.wheel[self.run];
+        let inertia = self.data.context.inertia;
+        self.columns(|k| -slope[k] * u(k), |k| inertia * u(k), zero)
+    }
+
+    /// Where the vehicle speed reads so much less.
+    fn by_speed(&self, u: impl Fn(usize) -> f64) -> Triple {
+        let slope = &self.slopes.speed[self.run];
+        let mass = self.data.context.mass;
+        self.columns(|k| -slope[k] * u(k), zero, |k| mass * u(k))
+    }
+
+    /// Zero-phase: what inputs and reading differ by in bandwidth, and what smoothing leaves of the slip's noise.
+    fn by_force(&self, reach: f64) -> Triple {
+        let s = self.series;
+        // As the readings say it: a lag that filters their noise must find that done already.
+        let mut force = self.slopes.force[self.run].clone();
+        for (force, beside) in force.iter_mut().zip(&s.beside_law) {
+            *force -= beside;
+        }
+        let mean = mean_twice_about(&s.time, &force, &s.tyre, reach);
+        self.columns(|k| force[k] - mean[k], zero, zero)
+    }
+
+    /// A mean over noisy slip is not the law at the mean slip: half its second derivative times the noise's variance.
+    fn by_curvature(&self) -> Triple {
+        let s = self.series;
+        let radius = self.data.context.radius;
+        let curve = |k: usize| {
+            if !s.rolling[k] {
+                return 0.0;
+            }
+            let noise = (radius / s.speed.smooth[k] * s.wheel.sigma).powi(2)
+                + (radius * s.wheel.smooth[k] / s.speed.smooth[k].powi(2) * s.speed.sigma).powi(2);
+            -0.5 * self.slopes.curvature[self.run][k] * noise
+        };
+        self.columns(curve, zero, zero)
+    }
+
+    /// The same of a slip that moves within a window of a sensor or of the smoother: half the second derivative times
+    /// the rate's square, by the window's variance in s².
+    fn by_motion(&self) -> Triple {
+        let s = self.series;
+        let radius = self.data.context.radius;
+        let curve = |k: usize| {
+            if !s.rolling[k] {
+                return 0.0;
+            }
+            let (v, omega) = (s.speed.smooth[k], s.wheel.smooth[k]);
+            let rate = radius * (omega * self.speed_rate[k] / (v * v) - self.wheel_rate[k] / v);
+            -0.5 * self.slopes.curvature[self.run][k] * rate * rate
+        };
+        self.columns(curve, zero, zero)
+    }
+
+    /// What smoothing over this reach takes off a force or torque, integrated.
+    fn smoothed_away(&self, x: &[f64], reach: f64) -> Vec<f64> {
+        let s = self.series;
+        let segments = if s.wheel_balance.is_empty() {
+            &s.vehicle_balance
+        } else {
+            &s.wheel_balance
+        };
+        let mean = mean_twice_about(&s.time, x, segments, reach);
+        let mut sum = 0.0;
+        (0..s.len())
+            .map(|k| {
+                let d = (x[k] - mean[k]) * s.dt[k].min(0.1);
+                if d.is_finite() {
+                    sum += d;
+                }
+                sum
+            })
+            .collect()
+    }
+
+    /// The brake smoothed, where it is integrated. A lag of the brake filters its reading's noise, and must find that
+    /// done already; nothing does that to the drag's.
+    fn by_brake(&self, reach: f64) -> Triple {
+        let torque = match &self.series.torque {
+            Some(torque) => torque.smooth.clone(),
+            None => vec![0.0; self.series.len()],
+        };
+        let level = self.smoothed_away(&torque, reach);
+        self.columns(zero, |k| level[k], zero)
+    }
+
+    /// The drag smoothed, where it is integrated.
+    fn by_drag(&self, reach: f64) -> Triple {
+        let force = quiet_force(self.series, &self.slopes.force[self.run]);
+        let level = self.smoothed_away(&force, reach);
+        let lever = -self.data.context.radius;
+        self.columns(zero, |k| lever * level[k], |k| level[k])
+    }
+
+    /// A vehicle speed late by so many poles instead of by a delay.
+    fn by_poles(&self, poles: usize) -> Triple {
+        let s = self.series;
+        let late = self.data.vehicle_late;
+        let level = if late > LEAST_POLE_S && !s.vehicle_balance.is_empty() {
+            let force = quiet_force(s, &self.slopes.force[self.run]);
+            let force: Vec<f64> = force.into_iter().map(finite_or_zero).collect();
+            poles_for_delay(&s.time, &s.dt, &force, late, poles)
+        } else {
+            vec![0.0; s.len()]
+        };
+        self.columns(zero, zero, |k| level[k])
+    }
+}
+
+/// The columns on one run, with the prior standard deviations of their coefficients.
+pub fn nuisances(data: &Data, slopes: &Slopes, run: usize) -> Vec<(f64, Triple)> {
+    let chain = Chain::new(data, slopes, run);
+    let s = chain.series;
+    let (wheel_rate, speed_rate) = (&chain.wheel_rate, &chain.speed_rate);
+    let wheel_second = second(wheel_rate, &s.time);
+    let speed_second = second(speed_rate, &s.time);
+    let mean = data.context.mean_wheel_speed;
+    let torque = |k: usize| s.torque.as_ref().map_or(0.0, |t| t.smooth[k]);
+    let late = data.timing_std;
+    vec![
+        // Wheel speed late.
+        (late.wheel, chain.by_wheel(|k| wheel_rate[k])),
+        // Vehicle speed late.
+        (late.vehicle, chain.by_speed(|k| speed_rate[k])),
+        // Brake late.
+        (late.brake, chain.columns(zero, torque, zero)),
+        // Wheel speed late by turn.
+        (
+            0.001,
+            chain.by_wheel(|k| wheel_rate[k] * mean / s.wheel.smooth[k].abs().max(0.1 * mean)),
+        ),
+        // Force smoothed, 6 ms.
+        (4.0, chain.by_force(0.006)),
+        // Force smoothed, 20 ms.
+        (3.0, chain.by_force(0.02)),
+        // Force smoothed, 60 ms.
+        (1.0, chain.by_force(0.06)),
+        // Brake smoothed, 6 ms.
+        (4.0, chain.by_brake(0.006)),
+        // Brake smoothed, 20 ms.
+        (3.0, chain.by_brake(0.02)),
+        // Drag smoothed, 20 ms.
+        (3.0, chain.by_drag(0.02)),
+        // Law's curvature under slip noise.
+        (1.0, chain.by_curvature()),
+        // Law's curvature under moving slip.
+        (1e-4, chain.by_motion()),
+        // Vehicle speed low-passed.
+        (3e-3, chain.by_speed(|k| -0.5 * speed_second[k])),
+        // Vehicle speed late by one pole, by two, instead of by a delay.
+        (1.0, chain.by_poles(1)),
+        (1.0, chain.by_poles(2)),
+        // Wheel speed low-passed.
+        (3e-4, chain.by_wheel(|k| -0.5 * wheel_second[k])),
+    ]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_step_through_a_pole_ahead_of_its_delay_leaves_what_has_not_passed_yet() {
+        let (step, late, size) = (1e-4, 0.05, 300.0);
+        let time: Vec<f64> = (0..4000).map(|k| f64::from(k) * step).collect();
+        let dt = vec![step; time.len()];
+        let from = 0.1;
+        let force: Vec<f64> = time
+            .iter()
+            .map(|t| if *t >= from { size } else { 0.0 })
+            .collect();
+        let found = poles_for_delay(&time, &dt, &force, late, 1);
+        // From the step on: size late exp(-(t - from + late) / late).
+        for k in [1000, 1300, 2000, 3000] {
+            let expected = size * late * (-(time[k] - from + late) / late).exp();
+            assert!(
+                (found[k] - expected).abs() < 0.01 * size * late,
+                "{k}: {} {expected}",
+                found[k]
+            );
+        }
+        // Whatever the number of poles, in the end all of the impulse has passed.
+        let two = poles_for_delay(&time, &dt, &force, late, 2);
+        assert!(two[3400].abs() < 0.01 * size * late, "{}", two[3400]);
+    }
+}
