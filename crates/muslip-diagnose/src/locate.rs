@@ -74,6 +74,11 @@ pub fn intervals(
         .collect()
 }
 
+/// Ranges of a variable are made of so many bins.
+const BINS: usize = 40;
+/// Share of the difference's energy that a region holds.
+const SHARE: f64 = 0.8;
+
 /// Regions of operation that hold most of the difference: for each variable the shortest range with four fifths
 /// of its energy, the most concentrated first.
 #[must_use]
@@ -84,8 +89,6 @@ pub fn regions(
     usable: &[Vec<Range<usize>>],
     sigma: f64,
 ) -> Vec<Region> {
-    const BINS: usize = 40;
-    const SHARE: f64 = 0.8;
     let mut found: Vec<(f64, Region)> = Vec::new();
     let variables = [
         Variable::Slip,
@@ -99,70 +102,95 @@ pub fn regions(
     .into_iter()
     .chain((0..data.extra_names.len()).map(Variable::Column));
     for variable in variables {
-        let mut samples: Vec<(f64, f64)> = Vec::new();
-        for (run, segments) in usable.iter().enumerate() {
-            if segments.is_empty() {
-                continue;
-            }
-            let u = variable.values(data, run);
-            for segment in segments {
-                for k in segment.clone() {
-                    let d = difference[run][k];
-                    if u[k].is_finite() && d.is_finite() {
-                        samples.push((u[k], d * d));
-                    }
-                }
-            }
-        }
+        let mut samples = energies(data, &variable, difference, usable);
         let total: f64 = samples.iter().map(|s| s.1).sum();
         if samples.len() < 50 || !(total > 0.0) {
             continue;
         }
-        samples.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let low = samples[samples.len() / 500].0;
-        let high = samples[samples.len() - 1 - samples.len() / 500].0;
-        if !(high > low) {
-            continue;
-        }
-        let width = (high - low) / BINS as f64;
-        let mut energy = [0.0; BINS];
-        let mut count = [0usize; BINS];
-        for (u, e) in &samples {
-            let bin = (((u - low) / width).max(0.0) as usize).min(BINS - 1);
-            energy[bin] += e;
-            count[bin] += 1;
-        }
-        let mut best: Option<(usize, usize, f64, usize)> = None;
-        for from in 0..BINS {
-            let (mut sum, mut members) = (0.0, 0);
-            for to in from..BINS {
-                sum += energy[to];
-                members += count[to];
-                if sum >= SHARE * total {
-                    if best.is_none_or(|b| members < b.3) {
-                        best = Some((from, to, sum, members));
-                    }
-                    break;
-                }
-            }
-        }
-        if let Some((from, to, sum, members)) = best {
-            let concentration = (sum / total) / (members as f64 / samples.len() as f64).max(1e-6);
-            found.push((
-                concentration,
-                Region {
-                    balance,
-                    variable: variable.word(data),
-                    low: low + from as f64 * width,
-                    high: low + (to + 1) as f64 * width,
-                    z: (sum.sqrt() / sigma.max(1e-300)).min(1e6),
-                    share: (sum / total).clamp(0.0, 1.0),
-                },
-            ));
+        if let Some(range) = shortest(&mut samples, total) {
+            let region = Region {
+                balance,
+                variable: variable.word(data),
+                low: range.low,
+                high: range.high,
+                z: (range.energy.sqrt() / sigma.max(1e-300)).min(1e6),
+                share: (range.energy / total).clamp(0.0, 1.0),
+            };
+            let members = range.members as f64 / samples.len() as f64;
+            found.push(((range.energy / total) / members.max(1e-6), region));
         }
     }
     found.sort_by(|a, b| b.0.total_cmp(&a.0));
     found.into_iter().map(|(_, r)| r).take(4).collect()
+}
+
+/// Variable and squared difference at every sample at which both are known.
+fn energies(
+    data: &Data,
+    variable: &Variable,
+    difference: &[Vec<f64>],
+    usable: &[Vec<Range<usize>>],
+) -> Vec<(f64, f64)> {
+    let mut samples = Vec::new();
+    for (run, segments) in usable.iter().enumerate() {
+        if segments.is_empty() {
+            continue;
+        }
+        let u = variable.values(data, run);
+        for k in segments.iter().flat_map(Clone::clone) {
+            let d = difference[run][k];
+            if u[k].is_finite() && d.is_finite() {
+                samples.push((u[k], d * d));
+            }
+        }
+    }
+    samples
+}
+
+/// A range of a variable.
+struct Held {
+    low: f64,
+    high: f64,
+    energy: f64,
+    members: usize,
+}
+
+/// The range with the fewest samples that holds its share of the energy.
+fn shortest(samples: &mut [(f64, f64)], total: f64) -> Option<Held> {
+    samples.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let low = samples[samples.len() / 500].0;
+    let high = samples[samples.len() - 1 - samples.len() / 500].0;
+    if !(high > low) {
+        return None;
+    }
+    let width = (high - low) / BINS as f64;
+    let mut energy = [0.0; BINS];
+    let mut count = [0usize; BINS];
+    for (u, e) in &*samples {
+        let bin = (((u - low) / width).max(0.0) as usize).min(BINS - 1);
+        energy[bin] += e;
+        count[bin] += 1;
+    }
+    let mut best: Option<Held> = None;
+    for from in 0..BINS {
+        let (mut sum, mut members) = (0.0, 0);
+        for to in from..BINS {
+            sum += energy[to];
+            members += count[to];
+            if sum >= SHARE * total {
+                if best.as_ref().is_none_or(|b| members < b.members) {
+                    best = Some(Held {
+                        low: low + from as f64 * width,
+                        high: low + (to + 1) as f64 * width,
+                        energy: sum,
+                        members,
+                    });
+                }
+                break;
+            }
+        }
+    }
+    best
 }
 
 #[cfg(test)]

@@ -217,6 +217,29 @@ pub fn tyre<T: Listed>(
     state
 }
 
+/// What the terms make of a wheel or a vehicle on which nothing acts but the brake torque as smoothed.
+pub fn acting<T: Listed>(
+    catalogue: &Catalogue,
+    model: &Model,
+    p: &[T],
+    series: &Series,
+    context: &Context,
+    stage: Stage,
+) -> State<T> {
+    let mut state = State::empty();
+    state.opposing = vec![T::constant(0.0); series.len()];
+    if let Some(torque) = &series.torque {
+        state.brake = torque.smooth.iter().map(|t| T::constant(*t)).collect();
+    }
+    for (entry, own) in split(model, p) {
+        let mechanism = T::entry(catalogue, entry);
+        if mechanism.acts_at(stage) {
+            mechanism.apply(own, series, context, &mut state);
+        }
+    }
+    state
+}
+
 /// Imbalance of what has this inertia and speed: inertia Δspeed/Δt + the mean over the step of what opposes it.
 fn imbalance<T: Number>(
     inertia: f64,
@@ -253,15 +276,7 @@ pub fn wheel<T: Listed>(
     let (Some(torque), false) = (&series.torque, series.drag.is_empty()) else {
         return vec![T::constant(0.0); n];
     };
-    let mut state = State::empty();
-    state.opposing = vec![T::constant(0.0); n];
-    state.brake = torque.smooth.iter().map(|t| T::constant(*t)).collect();
-    for (entry, own) in split(model, p) {
-        let mechanism = T::entry(catalogue, entry);
-        if mechanism.acts_at(Stage::Wheel) {
-            mechanism.apply(own, series, context, &mut state);
-        }
-    }
+    let state = acting(catalogue, model, p, series, context, Stage::Wheel);
     let true_share = T::constant(1.0) / (state.gain_change + 1.0);
     let opposing = |k: usize| {
         // Deviations from the base model act on smoothed columns, so that a parameter cannot buy
@@ -289,14 +304,7 @@ pub fn vehicle<T: Listed>(
     if series.drag.is_empty() {
         return vec![T::constant(0.0); n];
     }
-    let mut state = State::empty();
-    state.opposing = vec![T::constant(0.0); n];
-    for (entry, own) in split(model, p) {
-        let mechanism = T::entry(catalogue, entry);
-        if mechanism.acts_at(Stage::Vehicle) {
-            mechanism.apply(own, series, context, &mut state);
-        }
-    }
+    let state = acting(catalogue, model, p, series, context, Stage::Vehicle);
     let true_share = T::constant(1.0) / (state.gain_change + 1.0);
     let force = |k: usize| {
         let chain = chain.map_or(0.0, |c| c[k]);

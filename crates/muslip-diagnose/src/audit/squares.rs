@@ -248,21 +248,7 @@ pub fn refine(
             break;
         }
         if instrumental {
-            // No sum falls along an instrument's way: short steps instead.
-            let longest = free
-                .iter()
-                .enumerate()
-                .map(|(place, &i)| (step[place] / (LONGEST_STEP * steps[i])).abs())
-                .fold(1.0, f64::max);
-            for (place, &i) in free.iter().enumerate() {
-                unknowns[i] -= step[place] / longest;
-            }
-            let moved = free
-                .iter()
-                .enumerate()
-                .map(|(p, &i)| (step[p] / steps[i]).abs())
-                .fold(0.0, f64::max);
-            if moved < SETTLED {
+            if stepped_shortly(&mut unknowns, step.as_slice(), &steps, &free) < SETTLED {
                 return last.map(|estimate| Solution {
                     unknowns,
                     ..estimate
@@ -271,39 +257,62 @@ pub fn refine(
             continue;
         }
         let before = sum / variance + penalty(&unknowns, &prior);
-        let mut share = 1.0;
-        let mut moved = false;
-        for _ in 0..4 {
-            let mut trial = unknowns.clone();
-            for (place, &i) in free.iter().enumerate() {
-                trial[i] -= share * step[place];
+        let value = |x: &[f64]| {
+            sum_of(&whitener.apply(&balance.residual(x))) / variance + penalty(x, &prior)
+        };
+        let gain = match downhill(&unknowns, step.as_slice(), &free, before, value) {
+            Some((lower, value)) => {
+                unknowns = lower;
+                before - value
             }
-            let value = sum_of(&whitener.apply(&balance.residual(&trial))) / variance
-                + penalty(&trial, &prior);
-            if value < before {
-                moved = before - value > 1e-3;
-                unknowns = trial;
-                break;
-            }
-            share *= 0.4;
-        }
-        if !moved && pass + 1 < passes {
-            // Converged: one more pass only for the figures at the end.
-            return Some(last.map_or_else(
-                || Solution {
-                    unknowns: unknowns.clone(),
-                    std: vec![f64::INFINITY; unknowns.len()],
-                    sum,
-                    rows,
-                },
-                |estimate| Solution {
-                    unknowns: unknowns.clone(),
-                    ..estimate
-                },
-            ));
+            None => 0.0,
+        };
+        if !(gain > 1e-3) && pass + 1 < passes {
+            // Converged.
+            return last.map(|estimate| Solution {
+                unknowns,
+                ..estimate
+            });
         }
     }
     last
+}
+
+/// Takes a step, a long one shortened, for no sum falls along an instrument's way; how long it was asked for, in the
+/// steps of the derivatives.
+fn stepped_shortly(unknowns: &mut [f64], step: &[f64], steps: &[f64], free: &[usize]) -> f64 {
+    let by = || free.iter().zip(step);
+    let longest = by()
+        .map(|(&i, step)| (step / (LONGEST_STEP * steps[i])).abs())
+        .fold(1.0, f64::max);
+    for (&i, step) in by() {
+        unknowns[i] -= step / longest;
+    }
+    by().map(|(&i, step)| (step / steps[i]).abs())
+        .fold(0.0, f64::max)
+}
+
+/// The first place along a step, shortened where need be, at which the value is lower than before; and that value.
+fn downhill(
+    unknowns: &[f64],
+    step: &[f64],
+    free: &[usize],
+    before: f64,
+    value: impl Fn(&[f64]) -> f64,
+) -> Option<(Vec<f64>, f64)> {
+    let mut share = 1.0;
+    for _ in 0..4 {
+        let mut trial = unknowns.to_vec();
+        for (&i, step) in free.iter().zip(step) {
+            trial[i] -= share * step;
+        }
+        let value = value(&trial);
+        if value < before {
+            return Some((trial, value));
+        }
+        share *= 0.4;
+    }
+    None
 }
 
 /// Largest step at which an instrumental pass has settled, in the steps of the derivatives.

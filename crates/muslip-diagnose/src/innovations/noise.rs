@@ -205,6 +205,17 @@ impl Source {
     }
 }
 
+/// What stays what it is over a run.
+const OF_A_RUN: Option<Kind> = Some(Kind::Constant);
+
+fn forgetting(time_s: f64) -> Option<Kind> {
+    Some(Kind::Forgetting(time_s))
+}
+
+fn integrated(time_s: f64) -> Option<Kind> {
+    Some(Kind::Integrated(time_s))
+}
+
 /// What the sensors' noise is like, and by what it enters.
 struct Sensors<'a> {
     data: &'a Data,
@@ -263,8 +274,6 @@ impl<'a> Sensors<'a> {
 
     fn tyre(&self) -> Vec<Source> {
         let (none, force) = (&self.none, &self.slopes.force);
-        let forgetting = |time_s| Some(Kind::Forgetting(time_s));
-        let of_a_run = Some(Kind::Constant);
         vec![
             Source::new("white", None, none, self.drag),
             Source::new(
@@ -284,10 +293,10 @@ impl<'a> Sensors<'a> {
             Source::new("drag, coloured", forgetting(0.07), none, 0.1 * self.drag),
             Source::new("friction, fast", forgetting(0.03), force, 0.003),
             Source::new("friction, slow", forgetting(0.6), force, 0.001).at_most(0.003),
-            Source::new("friction of a run", of_a_run, force, 0.002).at_most(0.005),
-            Source::new("zero of a run", of_a_run, none, 0.1 * self.drag)
+            Source::new("friction of a run", OF_A_RUN, force, 0.002).at_most(0.005),
+            Source::new("zero of a run", OF_A_RUN, none, 0.1 * self.drag)
                 .at_most(0.002 * self.data.context.max_drag),
-            Source::new("slip of a run", of_a_run, &self.slopes.slip, 1e-4).at_most(5e-4),
+            Source::new("slip of a run", OF_A_RUN, &self.slopes.slip, 1e-4).at_most(5e-4),
         ]
     }
 
@@ -309,17 +318,10 @@ impl<'a> Sensors<'a> {
         let root = context.dt.sqrt();
         let walk = (radius * self.drag).hypot(self.torque) * root;
         let level = inertia * self.wheel;
-        let integrated = |time_s| Some(Kind::Integrated(time_s));
-        let of_a_run = Some(Kind::Constant);
         vec![
             Source::new("walk", Some(Kind::Walk), none, walk),
             Source::new("white", None, none, level),
-            Source::new(
-                "wheel speed, coloured",
-                Some(Kind::Forgetting(0.02)),
-                none,
-                0.3 * level,
-            ),
+            Source::new("wheel speed, coloured", forgetting(0.02), none, 0.3 * level),
             Source::new("torque, fast", integrated(0.03), none, 0.2 * walk / root),
             Source::new("torque, slow", integrated(0.3), none, 0.03 * walk / root)
                 .at_most(0.1 * walk / root),
@@ -330,10 +332,10 @@ impl<'a> Sensors<'a> {
                 0.01 * walk / root,
             )
             .at_most(0.03 * walk / root),
-            Source::new("torque's scale of a run", of_a_run, &turned, 0.002).at_most(0.005),
+            Source::new("torque's scale of a run", OF_A_RUN, &turned, 0.002).at_most(0.005),
             Source::new(
                 "torque's zero of a run",
-                of_a_run,
+                OF_A_RUN,
                 &self.time,
                 0.001 * context.max_drag * radius,
             )
@@ -353,8 +355,6 @@ impl<'a> Sensors<'a> {
         } else {
             Kind::Forgetting(self.colour_time)
         };
-        let integrated = |time_s| Some(Kind::Integrated(time_s));
-        let of_a_run = Some(Kind::Constant);
         vec![
             Source::new("walk", Some(Kind::Walk), none, walk),
             Source::new("white", None, none, level),
@@ -366,7 +366,7 @@ impl<'a> Sensors<'a> {
             ),
             Source::new(
                 "vehicle speed, windowed",
-                Some(Kind::Forgetting(0.02)),
+                forgetting(0.02),
                 none,
                 0.3 * level,
             ),
@@ -374,8 +374,8 @@ impl<'a> Sensors<'a> {
                 .at_most(0.2 * walk / root),
             Source::new("force, drifting", integrated(3.0), none, 0.01 * walk / root)
                 .at_most(0.03 * walk / root),
-            Source::new("drag's scale of a run", of_a_run, &self.impulse, 0.002).at_most(0.005),
-            Source::new("force of a run", of_a_run, &self.time, 0.001 * force)
+            Source::new("drag's scale of a run", OF_A_RUN, &self.impulse, 0.002).at_most(0.005),
+            Source::new("force of a run", OF_A_RUN, &self.time, 0.001 * force)
                 .at_most(0.002 * force),
         ]
     }

@@ -7,8 +7,9 @@
 
 use crate::data::{Catalogue, Data, Listed};
 use crate::mechanism::{Balance, Context, Stage, State};
-use crate::model::{Model, tyre};
-use crate::series::Series;
+use crate::model::{Model, acting, tyre};
+use crate::number::Number;
+use crate::series::{Channel, Series};
 
 /// Rows of one run by balance, in the order tyre, wheel, vehicle.
 pub type Triple = [Vec<f64>; 3];
@@ -61,90 +62,20 @@ pub fn rows<T: Listed>(
     series: &Series,
     context: &Context,
 ) -> Rows<T> {
-    let n = series.len();
-    let zero = T::constant(0.0);
     let state = tyre(catalogue, model, p, series, context);
-    let chain: Option<Vec<T>> = state
-        .contact
-        .as_ref()
-        .map(|contact| (0..n).map(|k| state.force[k] - contact[k]).collect());
-    let of_chain = |k: usize| chain.as_ref().map_or(zero, |c| c[k]);
-    let by_law: Vec<f64> = state.force.iter().map(|f| f.value()).collect();
-    let wanted = |stage: Stage| {
-        let mut state = State::empty();
-        state.opposing = vec![zero; n];
-        if let Some(torque) = &series.torque {
-            state.brake = torque.smooth.iter().map(|t| T::constant(*t)).collect();
-        }
-        let mut at = model.base.len();
-        for term in &model.terms {
-            let own = &p[at..at + term.parameters.len()];
-            at += term.parameters.len();
-            let mechanism = T::entry(catalogue, term.entry);
-            if mechanism.acts_at(stage) {
-                mechanism.apply(own, series, context, &mut state);
-            }
-        }
-        state
-    };
-    // Deviations from the base are made of what does not hold the residual's own noise, or a parameter could buy
-    // noise by scaling it: the drag's by the model's reading, the speeds' by their slow part.
-    let quiet = quiet_force(series, &by_law);
-    let force = |gain: T, k: usize| {
-        (T::constant(1.0) / (gain + 1.0) - 1.0) * (-of_chain(k) + quiet[k])
-            + (-of_chain(k) + series.drag[k])
-    };
-    let integral = |rate: &dyn Fn(usize) -> T, level: &dyn Fn(usize) -> T| -> Vec<T> {
-        let mut sum = zero;
-        let mut before = zero;
-        (0..n)
-            .map(|k| {
-                let now = rate(k);
-                let now = if now.value().is_finite() { now } else { before };
-                if k > 0 {
-                    sum += (now + before) * (0.5 * series.dt[k].min(10.0 * series.typical_dt));
-                }
-                before = now;
-                level(k) + sum
-            })
-            .collect()
-    };
+    let acting = |stage: Stage| acting(catalogue, model, p, series, context, stage);
+    let force = Force::new(series, &state);
     let wheel = match (&series.torque, series.wheel_balance.is_empty()) {
         (Some(torque), false) => {
-            let wheel = wanted(Stage::Wheel);
-            let rolling = state.rolling_moment.as_ref();
-            integral(
-                &|k| {
-                    let brake = wheel.brake[k] + (torque.raw[k] - torque.smooth[k]);
-                    let rolling = rolling.map_or(zero, |r| r[k]);
-                    brake + wheel.opposing[k] + rolling
-                        - force(wheel.gain_change, k) * context.radius
-                },
-                &|k| {
-                    // What the reading is off by, an encoder's ripple, is off in the level as well.
-                    let beyond = state.read_off.as_ref().map_or(zero, |off| off[k]);
-                    let off = state.omega[k] - series.wheel.smooth[k] + beyond;
-                    let off = if off.value().is_finite() { off } else { zero };
-                    wheel.inertia_change * (context.inertia * series.wheel.slow[k])
-                        + (off + series.wheel.raw[k]) * context.inertia
-                },
-            )
+            let acting = acting(Stage::Wheel);
+            wheel(series, torque, context, &force, &state, &acting)
         }
         _ => Vec::new(),
     };
     let vehicle = if series.vehicle_balance.is_empty() {
         Vec::new()
     } else {
-        let vehicle = wanted(Stage::Vehicle);
-        // A mass in error scales what slows it: by the model's force, for the speed's own errors are in the level.
-        let lighter = T::constant(1.0) / (vehicle.inertia_change + 1.0) - 1.0;
-        integral(
-            &|k| {
-                let slowing = -of_chain(k) + quiet[k] + vehicle.opposing[k];
-                force(vehicle.gain_change, k) + vehicle.opposing[k] + lighter * slowing
-            },
-            &|k| T::constant(context.mass * series.speed.raw[k]),
-        )
+        vehicle(series, context, &force, &acting(Stage::Vehicle))
     };
     let mut tyre = state.force;
     if series.tyre.is_empty() {
@@ -158,4 +89,106 @@ pub fn rows<T: Listed>(
         wheel,
         vehicle,
     }
+}
+
+/// The force in the contact by the reading: less what the model says that the load cell adds.
+struct Force<'a, T> {
+    series: &'a Series,
+    added: Option<Vec<T>>,
+    /// The reading without its own noise.
+    quiet: Vec<f64>,
+}
+
+impl<'a, T: Number> Force<'a, T> {
+    fn new(series: &'a Series, tyre: &State<T>) -> Self {
+        let by_law: Vec<f64> = tyre.force.iter().map(|f| f.value()).collect();
+        let added = tyre.contact.as_ref().map(|contact| {
+            let samples = 0..series.len();
+            samples.map(|k| tyre.force[k] - contact[k]).collect()
+        });
+        Self {
+            series,
+            added,
+            quiet: quiet_force(series, &by_law),
+        }
+    }
+
+    fn added(&self, k: usize) -> T {
+        self.added.as_ref().map_or(T::constant(0.0), |c| c[k])
+    }
+
+    /// Without the reading's own noise.
+    fn quiet(&self, k: usize) -> T {
+        -self.added(k) + self.quiet[k]
+    }
+
+    /// Where the reading's scale is wrong by this. Deviations from the base are made of what does not hold the
+    /// residual's own noise, or a parameter could buy noise by scaling it: the drag's by the model's reading, the
+    /// speeds' by their slow part.
+    fn at(&self, gain: T, k: usize) -> T {
+        (T::constant(1.0) / (gain + 1.0) - 1.0) * self.quiet(k)
+            + (-self.added(k) + self.series.drag[k])
+    }
+}
+
+fn wheel<T: Number>(
+    series: &Series,
+    torque: &Channel,
+    context: &Context,
+    force: &Force<'_, T>,
+    tyre: &State<T>,
+    acting: &State<T>,
+) -> Vec<T> {
+    let zero = T::constant(0.0);
+    let slowing = |k: usize| {
+        let brake = acting.brake[k] + (torque.raw[k] - torque.smooth[k]);
+        let rolling = tyre.rolling_moment.as_ref().map_or(zero, |r| r[k]);
+        brake + acting.opposing[k] + rolling - force.at(acting.gain_change, k) * context.radius
+    };
+    let level = |k: usize| {
+        // What the reading is off by, an encoder's ripple, is off in the level as well.
+        let beyond = tyre.read_off.as_ref().map_or(zero, |off| off[k]);
+        let off = tyre.omega[k] - series.wheel.smooth[k] + beyond;
+        let off = if off.value().is_finite() { off } else { zero };
+        acting.inertia_change * (context.inertia * series.wheel.slow[k])
+            + (off + series.wheel.raw[k]) * context.inertia
+    };
+    integrated(series, slowing, level)
+}
+
+fn vehicle<T: Number>(
+    series: &Series,
+    context: &Context,
+    force: &Force<'_, T>,
+    acting: &State<T>,
+) -> Vec<T> {
+    // A mass in error scales what slows it: by the model's force, for the speed's own errors are in the level.
+    let lighter = T::constant(1.0) / (acting.inertia_change + 1.0) - 1.0;
+    let slowing = |k: usize| {
+        let own = force.quiet(k) + acting.opposing[k];
+        force.at(acting.gain_change, k) + acting.opposing[k] + lighter * own
+    };
+    let level = |k: usize| T::constant(context.mass * series.speed.raw[k]);
+    integrated(series, slowing, level)
+}
+
+/// A level, and the integral of a rate on top of it.
+fn integrated<T: Number>(
+    series: &Series,
+    rate: impl Fn(usize) -> T,
+    level: impl Fn(usize) -> T,
+) -> Vec<T> {
+    let mut sum = T::constant(0.0);
+    let mut before = sum;
+    (0..series.len())
+        .map(|k| {
+            let now = rate(k);
+            let now = if now.value().is_finite() { now } else { before };
+            if k > 0 {
+                sum += (now + before) * (0.5 * series.dt[k].min(10.0 * series.typical_dt));
+            }
+            before = now;
+            level(k) + sum
+        })
+        .collect()
 }

@@ -57,75 +57,68 @@ pub use crate::balance::Balance;
 pub use crate::context::{Before, Context};
 use crate::number::Number;
 
+fn entry<T: Number>(mechanism: impl Mechanism<T> + 'static) -> Box<dyn Mechanism<T>> {
+    Box::new(mechanism)
+}
+
 /// All mechanisms in all their forms. The order is part of no file format.
 #[must_use]
 pub fn catalogue<T: Number>() -> Vec<Box<dyn Mechanism<T>>> {
     let mut all: Vec<Box<dyn Mechanism<T>>> = vec![
-        Box::new(load_crosstalk::LoadCrosstalk),
-        Box::new(inertial_reaction::InertialReaction),
-        Box::new(force_delay::ForceDelay),
-        Box::new(force_lag::ForceLag),
-        Box::new(load_sensitivity::LoadSensitivity {
+        entry(load_crosstalk::LoadCrosstalk),
+        entry(inertial_reaction::InertialReaction),
+        entry(force_delay::ForceDelay),
+        entry(force_lag::ForceLag),
+        entry(load_sensitivity::LoadSensitivity {
             with_stiffness: false,
         }),
-        Box::new(load_sensitivity::LoadSensitivity {
+        entry(load_sensitivity::LoadSensitivity {
             with_stiffness: true,
         }),
-        Box::new(slip_hysteresis::SlipHysteresis),
-        Box::new(rolling_resistance::RollingResistance { growing: false }),
-        Box::new(rolling_resistance::RollingResistance { growing: true }),
-        Box::new(surface_patch::SurfacePatch { patches: 1 }),
-        Box::new(surface_patch::SurfacePatch { patches: 2 }),
-        Box::new(force_gain::ForceGain),
-        Box::new(aero_drag::AeroDrag),
-        Box::new(grade_or_drive::GradeOrDrive),
-        Box::new(vehicle_inertia::VehicleInertia),
-        Box::new(brake_fade::BrakeFade),
-        Box::new(brake_lag::BrakeLag),
-        Box::new(wheel_inertia::WheelInertia),
+        entry(slip_hysteresis::SlipHysteresis),
+        entry(rolling_resistance::RollingResistance { growing: false }),
+        entry(rolling_resistance::RollingResistance { growing: true }),
+        entry(surface_patch::SurfacePatch { patches: 1 }),
+        entry(surface_patch::SurfacePatch { patches: 2 }),
+        entry(force_gain::ForceGain),
+        entry(aero_drag::AeroDrag),
+        entry(grade_or_drive::GradeOrDrive),
+        entry(vehicle_inertia::VehicleInertia),
+        entry(brake_fade::BrakeFade),
+        entry(brake_lag::BrakeLag),
+        entry(wheel_inertia::WheelInertia),
     ];
-    for form in structural_resonance::FORMS {
-        all.push(Box::new(structural_resonance::StructuralResonance { form }));
-    }
-    for form in force_saturation::FORMS {
-        all.push(Box::new(force_saturation::ForceSaturation { form }));
-    }
-    for form in curve_shape::FORMS {
-        all.push(Box::new(curve_shape::CurveShape { form }));
-    }
-    for form in speed_sensitivity::FORMS {
-        all.push(Box::new(speed_sensitivity::SpeedSensitivity { form }));
-    }
-    for form in thermal_fade::FORMS {
-        all.push(Box::new(thermal_fade::ThermalFade { form }));
-    }
-    for form in relaxation_length::FORMS {
-        all.push(Box::new(relaxation_length::RelaxationLength { form }));
-    }
-    for form in effective_radius::FORMS {
-        all.push(Box::new(effective_radius::EffectiveRadius { form }));
-    }
-    for form in wear_drift::FORMS {
-        all.push(Box::new(wear_drift::WearDrift { form }));
-    }
-    for form in zero_drift::FORMS {
-        all.push(Box::new(zero_drift::ZeroDrift { form }));
-    }
+    all.extend(
+        structural_resonance::FORMS
+            .map(|form| entry(structural_resonance::StructuralResonance { form })),
+    );
+    all.extend(
+        force_saturation::FORMS.map(|form| entry(force_saturation::ForceSaturation { form })),
+    );
+    all.extend(curve_shape::FORMS.map(|form| entry(curve_shape::CurveShape { form })));
+    all.extend(
+        speed_sensitivity::FORMS.map(|form| entry(speed_sensitivity::SpeedSensitivity { form })),
+    );
+    all.extend(thermal_fade::FORMS.map(|form| entry(thermal_fade::ThermalFade { form })));
+    all.extend(
+        relaxation_length::FORMS.map(|form| entry(relaxation_length::RelaxationLength { form })),
+    );
+    all.extend(
+        effective_radius::FORMS.map(|form| entry(effective_radius::EffectiveRadius { form })),
+    );
+    all.extend(wear_drift::FORMS.map(|form| entry(wear_drift::WearDrift { form })));
+    all.extend(zero_drift::FORMS.map(|form| entry(zero_drift::ZeroDrift { form })));
     for form in once_a_turn::FORMS {
         let of = run_out::Of::Drag;
-        all.push(Box::new(run_out::RunOut { form, of }));
+        all.push(entry(run_out::RunOut { form, of }));
         if form.orders == 1 {
             let of = run_out::Of::Radius;
-            all.push(Box::new(run_out::RunOut { form, of }));
+            all.push(entry(run_out::RunOut { form, of }));
         }
     }
-    for form in once_a_turn::FORMS {
-        all.push(Box::new(encoder_ripple::EncoderRipple { form }));
-    }
-    for form in bearing_drag::FORMS {
-        all.push(Box::new(bearing_drag::BearingDrag { form }));
-    }
-    all.push(Box::new(vehicle_speed_delay::VehicleSpeedDelay));
-    all.push(Box::new(wheel_speed_delay::WheelSpeedDelay));
+    all.extend(once_a_turn::FORMS.map(|form| entry(encoder_ripple::EncoderRipple { form })));
+    all.extend(bearing_drag::FORMS.map(|form| entry(bearing_drag::BearingDrag { form })));
+    all.push(entry(vehicle_speed_delay::VehicleSpeedDelay));
+    all.push(entry(wheel_speed_delay::WheelSpeedDelay));
     all
 }
