@@ -158,6 +158,56 @@ fn mean(values: impl Iterator<Item = f64>, fallback: f64) -> f64 {
     if count > 0.0 { sum / count } else { fallback }
 }
 
+fn median(mut values: Vec<f64>, fallback: f64) -> f64 {
+    if values.is_empty() {
+        fallback
+    } else {
+        median_in_place(&mut values)
+    }
+}
+
+/// Length of a run in s.
+fn span(s: &Series) -> f64 {
+    match (s.time.first(), s.time.last()) {
+        (Some(a), Some(b)) => b - a,
+        _ => 0.0,
+    }
+}
+
+/// The drag in N that one sample of a thousand exceeds.
+fn largest_drag(series: &[Series]) -> f64 {
+    let mut drags: Vec<f64> = series
+        .iter()
+        .flat_map(|s| s.drag_smooth.iter().copied())
+        .filter(|d| d.is_finite())
+        .collect();
+    if drags.is_empty() {
+        return 1.0;
+    }
+    let at = (drags.len() - 1).min(drags.len() * 999 / 1000);
+    *drags.select_nth_unstable_by(at, f64::total_cmp).1
+}
+
+/// What tyre and brake have done before each run and over the whole campaign.
+fn take_up_work(context: &mut Context, series: &[Series]) {
+    let mut before = Before::default();
+    let mut brake = 0.0;
+    for s in series {
+        context.before.push(before);
+        for k in 0..s.len() {
+            before.work += s.nominal_power(k, context) * s.dt[k];
+            if let Some(t) = &s.torque {
+                let p = t.smooth[k] * s.wheel.smooth[k] * s.dt[k];
+                brake += if p.is_finite() { p.max(0.0) } else { 0.0 };
+            }
+        }
+        before.time += span(s);
+    }
+    context.total_work = before.work;
+    context.mean_power = before.work / context.total_time;
+    context.mean_brake_power = brake / context.total_time;
+}
+
 impl Data {
     /// Prepares all runs of a campaign.
     #[must_use]
@@ -244,27 +294,8 @@ impl Data {
         let finite_max = |values: &mut dyn Iterator<Item = f64>| {
             values.filter(|v| v.is_finite()).fold(0.0, f64::max)
         };
-        let mut drags: Vec<f64> = series
-            .iter()
-            .flat_map(|s| s.drag_smooth.iter().copied())
-            .filter(|d| d.is_finite())
-            .collect();
-        let max_drag = if drags.is_empty() {
-            1.0
-        } else {
-            let at = (drags.len() - 1).min(drags.len() * 999 / 1000);
-            *drags.select_nth_unstable_by(at, f64::total_cmp).1
-        };
-        let mut steps: Vec<f64> = series.iter().map(|s| s.typical_dt).collect();
-        let mut sigmas: Vec<f64> = series
-            .iter()
-            .map(|s| s.drag_sigma)
-            .filter(|s| *s > 0.0)
-            .collect();
-        let span = |s: &Series| match (s.time.first(), s.time.last()) {
-            (Some(a), Some(b)) => b - a,
-            _ => 0.0,
-        };
+        let steps = series.iter().map(|s| s.typical_dt);
+        let sigmas = series.iter().map(|s| s.drag_sigma);
         let mut context = Context {
             radius: rig.radius_m,
             inertia: rig.wheel_inertia_kg_m2,
@@ -274,11 +305,7 @@ impl Data {
             mean_speed: mean(rolling(|s, k| s.speed.smooth[k]), 1.0).max(1e-3),
             max_speed: finite_max(&mut rolling(|s, k| s.speed.smooth[k])).max(1e-3),
             mean_wheel_speed: mean(rolling(|s, k| s.wheel.smooth[k].abs()), 1.0).max(1e-3),
-            dt: if steps.is_empty() {
-                1.0
-            } else {
-                median_in_place(&mut steps)
-            },
+            dt: median(steps.collect(), 1.0),
             duration: series.iter().map(span).fold(0.0, f64::max).max(1e-3),
             total_time: series.iter().map(span).sum::<f64>().max(1e-3),
             runs: series.len(),
@@ -296,32 +323,11 @@ impl Data {
                 .first()
                 .and_then(|s| s.time.first().copied())
                 .unwrap_or(0.0),
-            drag_sigma: if sigmas.is_empty() {
-                0.0
-            } else {
-                median_in_place(&mut sigmas)
-            },
-            max_drag: max_drag.abs().max(1e-9),
+            drag_sigma: median(sigmas.filter(|s| *s > 0.0).collect(), 0.0),
+            max_drag: largest_drag(series).abs().max(1e-9),
             ..Context::default()
         };
-        let mut before = Before::default();
-        let mut power = 0.0;
-        let mut brake = 0.0;
-        for s in series {
-            context.before.push(before);
-            for k in 0..s.len() {
-                before.work += s.nominal_power(k, &context) * s.dt[k];
-                if let Some(t) = &s.torque {
-                    let p = t.smooth[k] * s.wheel.smooth[k] * s.dt[k];
-                    brake += if p.is_finite() { p.max(0.0) } else { 0.0 };
-                }
-            }
-            before.time += span(s);
-        }
-        power += before.work;
-        context.total_work = before.work;
-        context.mean_power = power / context.total_time;
-        context.mean_brake_power = brake / context.total_time;
+        take_up_work(&mut context, series);
         context
     }
 }

@@ -3,7 +3,7 @@
 use crate::data::{Catalogue, Listed};
 use crate::mechanism::{Context, Law, Stage, State};
 use crate::number::Number;
-use crate::series::Series;
+use crate::series::{Channel, Series};
 
 /// Parameters that every tyre model has: logarithms of peak friction and slip at the peak, and three
 /// shares that say how the inputs are to be read between raw and smoothed (no physics: see `prepare`).
@@ -102,6 +102,28 @@ fn apply_stage<T: Listed>(
     }
 }
 
+/// A channel smoothed a share less, and a share more.
+fn blended<T: Number>(channel: &Channel, raw_share: T, smoother_share: T) -> Vec<T> {
+    let Channel {
+        raw,
+        smooth,
+        smoother,
+        ..
+    } = channel;
+    let zero = T::constant(0.0);
+    // Shares that are exactly zero cost nothing to leave out.
+    if raw_share == zero && smoother_share == zero {
+        return smooth.iter().map(|x| T::constant(*x)).collect();
+    }
+    (0..smooth.len())
+        .map(|k| {
+            raw_share * (raw[k] - smooth[k])
+                + smoother_share * (smoother[k] - smooth[k])
+                + smooth[k]
+        })
+        .collect()
+}
+
 /// Runs the tyre model on one recording up to the friction, at the slip and so much beyond it.
 pub fn friction<T: Listed>(
     catalogue: &Catalogue,
@@ -120,30 +142,9 @@ pub fn friction<T: Listed>(
         load_share,
     ] = core::array::from_fn(|i| p[i]);
     let mut state = State::empty();
-    // Shares that are exactly zero cost nothing to leave out.
     let zero = T::constant(0.0);
-    let blend = |raw: &[f64], smooth: &[f64], smoother: &[f64]| -> Vec<T> {
-        if raw_share == zero && smoother_share == zero {
-            return smooth.iter().map(|x| T::constant(*x)).collect();
-        }
-        (0..n)
-            .map(|k| {
-                raw_share * (raw[k] - smooth[k])
-                    + smoother_share * (smoother[k] - smooth[k])
-                    + smooth[k]
-            })
-            .collect()
-    };
-    state.omega = blend(
-        &series.wheel.raw,
-        &series.wheel.smooth,
-        &series.wheel.smoother,
-    );
-    state.speed = blend(
-        &series.speed.raw,
-        &series.speed.smooth,
-        &series.speed.smoother,
-    );
+    state.omega = blended(&series.wheel, raw_share, smoother_share);
+    state.speed = blended(&series.speed, raw_share, smoother_share);
     state.load = (0..n)
         .map(|k| load_share * (series.load.raw[k] - series.load.smooth[k]) + series.load.smooth[k])
         .collect();

@@ -19,7 +19,9 @@ use crate::looked::looked_for;
 use crate::mechanism::{Balance, Id};
 use crate::model::Model;
 use crate::number::finite_or_zero;
-use crate::outcome::{Diagnosis, Fault, Fit, Recording, Role, ValueAndStd, Verdict};
+use crate::outcome::{
+    Diagnosis, Fault, Fit, NamedMechanism, Recording, Role, ValueAndStd, Verdict,
+};
 use crate::repaired::{Predicting, Repaired};
 use crate::series::Series;
 use crate::split::Split;
@@ -176,6 +178,17 @@ impl Answer<'_> {
         chosen.model.terms.is_empty() && chosen.extra.is_empty() && self.named_delays().is_empty()
     }
 
+    /// What works through the force is not sure where the force is not predicted any better.
+    fn doubt(&self, mechanisms: &mut [NamedMechanism]) {
+        for named in mechanisms {
+            let id = Id::parse(named.id);
+            let mechanism = id.and_then(|id| self.data.catalogue.of(id));
+            if mechanism.is_some_and(|m| m.facts().through_force) {
+                named.evidence.confidence = named.evidence.confidence.min(0.5);
+            }
+        }
+    }
+
     /// The diagnosis, proven by what the argument came to without what was kept for that.
     fn assemble(&self, kept: &Split, proof: Predicting) -> Diagnosis {
         let mut mechanisms = self.mechanisms();
@@ -205,14 +218,7 @@ impl Answer<'_> {
             Predicts::default()
         };
         if says_something && !predicts.known {
-            for named in &mut mechanisms {
-                if Id::parse(named.id)
-                    .and_then(|id| self.data.catalogue.of(id))
-                    .is_some_and(|m| m.facts().through_force)
-                {
-                    named.evidence.confidence = named.evidence.confidence.min(0.5);
-                }
-            }
+            self.doubt(&mut mechanisms);
         }
         let unexplained = self.unexplained();
         let verdict = match (mechanisms.is_empty(), unexplained.is_empty()) {
