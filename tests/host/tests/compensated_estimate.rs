@@ -6,7 +6,7 @@ mod common;
 
 use std::collections::VecDeque;
 
-use common::{HEADER, Scratch, number};
+use common::{HEADER, Scratch, number, words};
 use host_sim::{Brake, BrakeProgramme, Contact, Plant, PlantEffect, PlantParameters};
 use muslip_diagnose::campaign::Rig;
 use muslip_diagnose::mechanism::Context;
@@ -302,14 +302,7 @@ fn compensation_takes_the_bias_away() {
         for seed in 0..SEEDS {
             scratch.write("run.csv", recording(&case, seed));
             for (with, bias) in bias.iter_mut().enumerate() {
-                let mut arguments = vec![
-                    "estimate",
-                    "--rig",
-                    "rig.toml",
-                    "--estimator",
-                    "article",
-                    "--json",
-                ];
+                let mut arguments = words("estimate --rig rig.toml --estimator article --json");
                 if with == 1 {
                     arguments.extend(["--model", "model.toml"]);
                 }
@@ -353,15 +346,7 @@ fn the_efficient_estimator_compensates_too_but_for_filtered_forces() {
         let scratch = Scratch::with_rig(RIG);
         scratch.write("model.toml", model(&case));
         scratch.write("run.csv", recording(&case, 1));
-        let plain = [
-            "estimate",
-            "--rig",
-            "rig.toml",
-            "--model",
-            "model.toml",
-            "--json",
-            "run.csv",
-        ];
+        let plain = words("estimate --rig rig.toml --model model.toml --json run.csv");
         let told = scratch.json(&plain);
         if case.id == "force_lag" || case.form == "force" {
             assert_eq!(told["estimator"], "article");
@@ -389,34 +374,18 @@ fn what_cannot_be_compensated_is_named_and_nothing_else_changes() {
         .replace("share\"", "limit\"")
         .replace("value = 0.04", "value = 2500.0");
     scratch.write("model.toml", text);
-    let plain = scratch.json(&["estimate", "--rig", "rig.toml", "--json", "run.csv"]);
-    let told = scratch.json(&[
-        "estimate",
-        "--rig",
-        "rig.toml",
-        "--model",
-        "model.toml",
-        "--json",
-        "run.csv",
-    ]);
+    let plain = scratch.json(&words("estimate --rig rig.toml --json run.csv"));
+    let told = scratch.json(&words(
+        "estimate --rig rig.toml --model model.toml --json run.csv",
+    ));
     assert_eq!(
         told["model"]["not_compensated"][0]["id"],
         "force_saturation"
     );
     assert_eq!(told["peak_friction"], plain["peak_friction"]);
     assert_eq!(told["critical_slip"], plain["critical_slip"]);
-    let words = scratch.output(&[
-        "estimate",
-        "--rig",
-        "rig.toml",
-        "--model",
-        "model.toml",
-        "run.csv",
-    ]);
-    assert!(
-        words.contains("Not compensated: force_saturation"),
-        "{words}"
-    );
+    let said = scratch.output(&words("estimate --rig rig.toml --model model.toml run.csv"));
+    assert!(said.contains("Not compensated: force_saturation"), "{said}");
 }
 
 #[test]
@@ -425,14 +394,7 @@ fn a_model_of_another_rig_or_none_at_all_is_refused_in_one_line() {
     let scratch = Scratch::with_rig(&RIG.replace("0.31", "0.33"));
     scratch.write("run.csv", recording(case, 1));
     scratch.write("model.toml", model(case));
-    let call = [
-        "estimate",
-        "--rig",
-        "rig.toml",
-        "--model",
-        "model.toml",
-        "run.csv",
-    ];
+    let call = words("estimate --rig rig.toml --model model.toml run.csv");
     assert!(
         scratch
             .complaint(&call)

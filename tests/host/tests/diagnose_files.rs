@@ -286,28 +286,16 @@ fn with_column(
 #[test]
 fn faults_of_the_data_are_told_and_the_rest_is_used() {
     let good = campaign(1..5, faithful);
-    let empty = |_: usize, _: usize| String::new();
+    // A column in which every cell is this.
+    let held = |name: &'static str, cell: &str, told: &'static str| {
+        let recordings = with_column(&good, name, |_, _| cell.to_owned());
+        (name, recordings, told)
+    };
     let cases: Vec<(&str, Vec<String>, &str)> = vec![
-        (
-            "brake_torque_nm",
-            with_column(&good, "brake_torque_nm", empty),
-            "all values missing",
-        ),
-        (
-            "brake_torque_nm",
-            with_column(&good, "brake_torque_nm", |_, _| "5".into()),
-            "constant at 5",
-        ),
-        (
-            "temperature",
-            with_column(&good, "temperature", empty),
-            "all values missing",
-        ),
-        (
-            "temperature",
-            with_column(&good, "temperature", |_, _| "20.5".into()),
-            "constant at 20.5",
-        ),
+        held("brake_torque_nm", "", "all values missing"),
+        held("brake_torque_nm", "5", "constant at 5"),
+        held("temperature", "", "all values missing"),
+        held("temperature", "20.5", "constant at 20.5"),
         (
             "normal_force_n",
             changed(&good, |run, row, cells| {

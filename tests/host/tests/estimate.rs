@@ -2,18 +2,11 @@
 
 mod common;
 
-use common::{HEADER, RIG, Scratch, measured_data, number, recording_of};
+use common::{HEADER, RIG, Scratch, measured_data, number, recording_of, words};
 use serde_json::{Value, json};
 use test_support::scenario::article;
 
-const ESTIMATE: [&str; 6] = [
-    "estimate",
-    "--rig",
-    "rig.toml",
-    "--estimator",
-    "article",
-    "--json",
-];
+const ESTIMATE: &str = "estimate --rig rig.toml --estimator article --json";
 
 fn article_rig() -> String {
     // Friction noise 0.04 under 1000 N.
@@ -27,7 +20,7 @@ fn article_scratch(seed: u64) -> Scratch {
 }
 
 fn estimate(scratch: &Scratch, more: &[&str]) -> Value {
-    scratch.json(&[&ESTIMATE[..], more, &["run.csv"]].concat())
+    scratch.json(&[&words(ESTIMATE)[..], more, &["run.csv"]].concat())
 }
 
 fn trace(scratch: &Scratch, name: &str) -> Vec<Vec<f64>> {
@@ -279,7 +272,7 @@ fn without_a_usable_sample_there_is_one_line_and_status_2() {
         format!("{HEADER}\n0,1,0.1,200,1000\n1,,30,200,1000\n"),
     );
     assert_eq!(
-        scratch.complaint(&[&ESTIMATE[..], &["--trace", "t.csv", "run.csv"]].concat()),
+        scratch.complaint(&[&words(ESTIMATE)[..], &["--trace", "t.csv", "run.csv"]].concat()),
         "run.csv:1:1: no usable sample: 1 missing or not finite, 1 vehicle speed too low"
     );
     assert_eq!(scratch.files(), ["rig.toml", "run.csv"]);

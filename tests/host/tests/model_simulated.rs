@@ -6,7 +6,7 @@ mod diagnosis;
 
 use std::fs;
 
-use common::{Scratch, number};
+use common::{Scratch, number, words};
 use diagnosis::{RIG, campaign};
 use sealed_trial::{Request, generate};
 use serde_json::Value;
@@ -59,6 +59,12 @@ impl Bench {
         arguments.push("--score");
         arguments.extend(recordings);
         self.scratch.json(&arguments)
+    }
+
+    /// Predicts a run: `pred.csv`.
+    fn predict(&self, rig: &str, run: &str) {
+        let line = format!("predict --rig {rig} --model found/model.toml --out pred.csv {run}");
+        self.scratch.output(&words(&line));
     }
 
     fn simulate(&self, out: &str, more: &[&str]) -> String {
@@ -180,16 +186,7 @@ fn a_replay_without_noise_is_the_prediction_and_has_the_error_that_is_scored() {
     let run = bench.held_out();
     let told = bench.simulate("replay.csv", &["--inputs", run, "--no-noise"]);
     assert!(told.starts_with("replay.csv: 1500 rows of run"), "{told}");
-    bench.scratch.output(&[
-        "predict",
-        "--rig",
-        "rig.toml",
-        "--model",
-        "found/model.toml",
-        "--out",
-        "pred.csv",
-        run,
-    ]);
+    bench.predict("rig.toml", run);
     let (replay, recorded) = (bench.columns("replay.csv"), bench.columns(run));
     assert_eq!(replay.drag(), bench.columns("pred.csv").drag());
     assert_eq!(replay.names, recorded.names);
@@ -238,16 +235,7 @@ fn a_replay_has_the_model_s_noise_by_its_seed() {
 fn a_simulated_run_obeys_the_balances_and_a_prediction_gives_its_drag_back() {
     let bench = Bench::lagging(4);
     bench.simulate("run.csv", &["--no-noise", "--duration", "3"]);
-    bench.scratch.output(&[
-        "predict",
-        "--rig",
-        "rig.toml",
-        "--model",
-        "found/model.toml",
-        "--out",
-        "pred.csv",
-        "run.csv",
-    ]);
+    bench.predict("rig.toml", "run.csv");
     let (run, prediction) = (bench.columns("run.csv"), bench.columns("pred.csv"));
     assert_eq!(run.drag(), prediction.drag());
     let contact = prediction.get("contact_force_n");
@@ -361,50 +349,49 @@ fn what_cannot_be_simulated_is_told_in_one_line() {
             .collect::<String>(),
     );
     let files = scratch.files();
-    let found = "found/model.toml";
-    for (arguments, part) in [
-        (&["--model", "none.toml"][..], "none.toml"),
+    for (options, part) in [
+        ("--model none.toml", "none.toml"),
         (
-            &["--model", "other.toml"],
+            "--model other.toml",
             "other.toml:15:10: schema: \"muslip.model/2\" is not \"muslip.model/1\"",
         ),
-        (&["--model", found, "--inputs", "none.csv"], "none.csv"),
+        ("--model found/model.toml --inputs none.csv", "none.csv"),
         (
-            &["--model", found, "--inputs", "unloaded.csv"],
+            "--model found/model.toml --inputs unloaded.csv",
             "unloaded.csv:1:1: required column normal_force_n is missing",
         ),
         (
-            &["--model", found, "--inputs", "light.csv"],
+            "--model found/model.toml --inputs light.csv",
             "light.csv: no row lies in the model's domain",
         ),
         (
-            &["--model", found, "--speed", "90"],
+            "--model found/model.toml --speed 90",
             "found/model.toml: speed = 90 m/s is outside the model's domain",
         ),
         (
-            &["--model", found, "--normal-force", "50000"],
+            "--model found/model.toml --normal-force 50000",
             "found/model.toml: normal force = 50000 N is outside the model's domain",
         ),
         (
-            &["--model", found, "--duration", "0"],
+            "--model found/model.toml --duration 0",
             "duration = 0: must be finite and positive",
         ),
         (
-            &["--model", found, "--rig", "small.toml"],
+            "--model found/model.toml --rig small.toml",
             "small.toml:2:12: wheel.radius_m = 0.3: the model was made for a rig with 0.31",
         ),
         (
-            &["--model", found, "--law", "rudd:0.8,0.1"],
+            "--model found/model.toml --law rudd:0.8,0.1",
             "cannot be used with",
         ),
         (
-            &["--model", found, "--inputs", "run0.csv", "--speed", "20"],
+            "--model found/model.toml --inputs run0.csv --speed 20",
             "cannot be used with",
         ),
-        (&["--rig", "rig.toml", "--inputs", "run0.csv"], "--model"),
-        (&[], "--rig"),
+        ("--rig rig.toml --inputs run0.csv", "--model"),
+        ("", "--rig"),
     ] {
-        let all = [&["simulate", "--out", "out.csv"][..], arguments].concat();
+        let all = [&words("simulate --out out.csv")[..], &words(options)].concat();
         let complaint = scratch.complaint(&all);
         assert!(complaint.contains(part), "{complaint}");
     }
@@ -452,16 +439,7 @@ fn figures_come_again_whatever_the_model_holds() {
         bench.assert_figures_come_again(rig);
         // The same model runs forward, and its noise-free drag is what a prediction says.
         bench.simulate("run.csv", &["--no-noise", "--duration", "2"]);
-        bench.scratch.output(&[
-            "predict",
-            "--rig",
-            rig,
-            "--model",
-            "found/model.toml",
-            "--out",
-            "pred.csv",
-            "run.csv",
-        ]);
+        bench.predict(rig, "run.csv");
         let (run, prediction) = (bench.columns("run.csv"), bench.columns("pred.csv"));
         assert_eq!(run.drag(), prediction.drag(), "{mechanism}");
         assert!(

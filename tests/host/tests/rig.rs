@@ -9,7 +9,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-use common::{RIG, Scratch};
+use common::{RIG, Scratch, words};
 use muslip_record::Parameters;
 use pil::native::Native;
 use pil::rig::{Rig, Trouble};
@@ -151,20 +151,11 @@ fn recordings_go_straight_into_the_diagnosis() {
     let server = Server::start(Trouble::default());
     let scratch = Scratch::with_rig(RIG);
     for name in ["a.csv", "b.csv"] {
-        let said = scratch.output(&[
-            "rig",
-            "--port",
-            &server.address,
-            "run",
-            "--ramp",
-            "0.8",
-            "--applications",
-            "2",
-            "--cool",
-            "0.2",
-            "--out",
-            name,
-        ]);
+        let line = format!(
+            "rig --port {} run --ramp 0.8 --applications 2 --cool 0.2 --out {name}",
+            server.address
+        );
+        let said = scratch.output(&words(&line));
         assert!(said.contains(" 0 samples missing"), "{said}");
     }
     scratch.output(&[
@@ -200,16 +191,8 @@ fn an_interlock_that_stands_is_named_and_nothing_is_recorded() {
         ..Trouble::default()
     });
     let scratch = Scratch::new();
-    let told = scratch.complaint(&[
-        "rig",
-        "--port",
-        &server.address,
-        "run",
-        "--ramp",
-        "0.8",
-        "--out",
-        "run.csv",
-    ]);
+    let line = format!("rig --port {} run --ramp 0.8 --out run.csv", server.address);
+    let told = scratch.complaint(&words(&line));
     assert!(
         told.contains("error: the rig refuses to arm: interlock EmergencyStop"),
         "{told}"

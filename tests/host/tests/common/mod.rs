@@ -108,6 +108,11 @@ impl Scratch {
     }
 }
 
+/// A command line as its arguments; none of them has a space in it.
+pub fn words(line: &str) -> Vec<&str> {
+    line.split_whitespace().collect()
+}
+
 /// Points of the article's run as a recording at 30 m/s under 1000 N.
 pub fn recording_of(points: impl IntoIterator<Item = (f64, f64)>) -> String {
     let mut text = format!("{HEADER}\n");
