@@ -197,40 +197,37 @@ fn shortest(samples: &mut [(f64, f64)], total: f64) -> Option<Held> {
 mod tests {
     use super::*;
 
+    /// Intervals of a difference of two seconds at 500 Hz, in standard deviations.
+    fn intervals_of(difference: impl Fn(f64) -> f64) -> Vec<(f64, f64, f64)> {
+        let time: Vec<f64> = (0..1000).map(|k| f64::from(k) * 0.002).collect();
+        let d: Vec<f64> = time.iter().map(|t| difference(*t)).collect();
+        let all = 0..1000;
+        intervals(&time, &d, &[all], 1.0, 1.0)
+    }
+
     #[test]
     fn intervals_hold_what_rings_faster_than_the_mean() {
-        let time: Vec<f64> = (0..1000).map(|k| f64::from(k) * 0.002).collect();
-        let d: Vec<f64> = time
-            .iter()
-            .map(|t| {
-                if (0.5..1.0).contains(t) {
-                    3.0 * (core::f64::consts::TAU * 40.0 * t).sin()
-                } else {
-                    0.0
-                }
-            })
-            .collect();
-        let all = 0..1000;
-        let found = intervals(&time, &d, &[all], 1.0, 1.0);
+        let found = intervals_of(|t| {
+            if (0.5..1.0).contains(&t) {
+                3.0 * (core::f64::consts::TAU * 40.0 * t).sin()
+            } else {
+                0.0
+            }
+        });
         assert_eq!(found.len(), 1, "{found:?}");
         assert!((found[0].0 - 0.5).abs() < 0.03 && (found[0].1 - 1.0).abs() < 0.03);
     }
 
     #[test]
     fn intervals_close_short_gaps_and_keep_long_ones() {
-        let time: Vec<f64> = (0..1000).map(|k| f64::from(k) * 0.002).collect();
-        let d: Vec<f64> = time
-            .iter()
-            .map(|t| {
-                if (0.4..0.7).contains(t) || (0.75..0.9).contains(t) || (1.4..1.6).contains(t) {
-                    3.0
-                } else {
-                    0.0
-                }
-            })
-            .collect();
-        let all = 0..1000;
-        let found = intervals(&time, &d, &[all], 1.0, 1.0);
+        let away = [0.4..0.7, 0.75..0.9, 1.4..1.6];
+        let found = intervals_of(|t| {
+            if away.iter().any(|range| range.contains(&t)) {
+                3.0
+            } else {
+                0.0
+            }
+        });
         assert_eq!(found.len(), 2, "{found:?}");
         assert!((found[0].0 - 0.39).abs() < 0.02 && (found[0].1 - 0.91).abs() < 0.02);
         assert!((found[1].0 - 1.39).abs() < 0.02 && (found[1].1 - 1.61).abs() < 0.02);

@@ -10,20 +10,11 @@ const STILL_SAMPLES: usize = 20;
 
 /// Mean drag of a run at a standstill, N, and its standard deviation.
 fn zero_of(run: &Recording) -> Option<(f64, f64)> {
-    let top = run
-        .speed
-        .clean
-        .iter()
-        .copied()
-        .filter(|v| v.is_finite())
-        .fold(0.0, f64::max);
-    let turning = run
-        .wheel
-        .clean
-        .iter()
-        .copied()
-        .filter(|v| v.is_finite())
-        .fold(0.0, f64::max);
+    let largest = |values: &[f64]| {
+        let known = values.iter().copied().filter(|v| v.is_finite());
+        known.fold(0.0, f64::max)
+    };
+    let (top, turning) = (largest(&run.speed.clean), largest(&run.wheel.clean));
     let still: Vec<f64> = (0..run.time.len())
         .filter(|&k| {
             let calm = |c: &[f64], most: f64| c.get(k).is_some_and(|x| x.abs() < 0.01 * most);

@@ -125,6 +125,11 @@ pub fn symptom(case: &Case) -> String {
     said.join("; ")
 }
 
+/// What was said, and of what.
+fn for_forms(said: String, case: &Case) -> String {
+    format!("{said} for {}", case.forms.join("+"))
+}
+
 fn left(case: &Case) -> String {
     case.unexplained
         .first()
@@ -196,21 +201,13 @@ pub fn shortfalls(cases: &[Case]) -> Table {
         if case.first_right {
             return vec![];
         }
-        vec![format!(
-            "{} for {}",
-            first_named(case),
-            case.forms.join("+")
-        )]
+        vec![for_forms(first_named(case), case)]
     });
     row("right first or confusable", strong.clone(), &|case| {
         if case.in_set {
             return vec![];
         }
-        vec![format!(
-            "{} for {}",
-            first_named(case),
-            case.forms.join("+")
-        )]
+        vec![for_forms(first_named(case), case)]
     });
     row(
         "what a real chain has too, not told",
@@ -222,11 +219,7 @@ pub fn shortfalls(cases: &[Case]) -> Table {
             if case.timing_right != Some(false) {
                 return vec![];
             }
-            vec![format!(
-                "{} for {}",
-                first_named(case),
-                case.forms.join("+")
-            )]
+            vec![for_forms(first_named(case), case)]
         },
     );
     row("pairs, an effect not found", of("pair"), &|case| {
@@ -247,17 +240,13 @@ pub fn shortfalls(cases: &[Case]) -> Table {
         if case.honest {
             return vec![];
         }
-        vec![format!(
-            "{} for {}",
-            first_named(case),
-            case.forms.join("+")
-        )]
+        vec![for_forms(first_named(case), case)]
     });
     row("outside, other variable", of("outside"), &|case| {
         if case.variable_right != Some(false) {
             return vec![];
         }
-        vec![format!("{} for {}", left(case), case.forms.join("+"))]
+        vec![for_forms(left(case), case)]
     });
     row("parameter beyond 3 std", cases.iter().collect(), &|case| {
         case.figures

@@ -135,32 +135,20 @@ fn worst_difference(parts: &[Part<'_>], time: &[f64], draw: &mut ChaCha8Rng) -> 
     worst.max((whitener.log_variances.iter().sum::<f64>() - log_det).abs() / log_det.abs())
 }
 
+fn part(kind: Kind, std: f64, gain: &[f64]) -> Part<'_> {
+    Part { kind, std, gain }
+}
+
 #[test]
 fn the_filter_equals_dense_algebra_with_gaps_and_stretches_left_out() {
     let mut draw = ChaCha8Rng::seed_from_u64(7);
     for _ in 0..5 {
         let (time, gain) = times(&mut draw);
         let parts = [
-            Part {
-                kind: Kind::Forgetting(0.05),
-                std: 0.8,
-                gain: &gain,
-            },
-            Part {
-                kind: Kind::Constant,
-                std: 1.3,
-                gain: &gain,
-            },
-            Part {
-                kind: Kind::Forgetting(0.4),
-                std: 0.5,
-                gain: &[],
-            },
-            Part {
-                kind: Kind::Filtered(0.06),
-                std: 0.9,
-                gain: &gain,
-            },
+            part(Kind::Forgetting(0.05), 0.8, &gain),
+            part(Kind::Constant, 1.3, &gain),
+            part(Kind::Forgetting(0.4), 0.5, &[]),
+            part(Kind::Filtered(0.06), 0.9, &gain),
         ];
         assert!(worst_difference(&parts, &time, &mut draw) < 1e-9);
     }
@@ -172,21 +160,9 @@ fn the_filter_equals_dense_algebra_where_levels_are_unknown() {
     for _ in 0..5 {
         let (time, gain) = times(&mut draw);
         let parts = [
-            Part {
-                kind: Kind::Walk,
-                std: 0.6,
-                gain: &[],
-            },
-            Part {
-                kind: Kind::Forgetting(0.05),
-                std: 0.8,
-                gain: &gain,
-            },
-            Part {
-                kind: Kind::Integrated(0.1),
-                std: 2.0,
-                gain: &[],
-            },
+            part(Kind::Walk, 0.6, &[]),
+            part(Kind::Forgetting(0.05), 0.8, &gain),
+            part(Kind::Integrated(0.1), 2.0, &[]),
         ];
         // A variance of 1e8 leaves dense algebra itself six digits.
         let worst = worst_difference(&parts, &time, &mut draw);
