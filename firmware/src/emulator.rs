@@ -10,14 +10,14 @@ use muslip_control::emulation::{FromFirmware, ToFirmware};
 use muslip_record::{FRAME_BYTES, FrameReader, Parameters, encode};
 use stm32f4::stm32f405::{Interrupt, NVIC, TIM2, USART3, interrupt};
 
+use crate::bits::{low_u8, low_u16};
 use crate::cell::InterruptCell;
+use crate::dump::{EMULATED_PINS, dump};
 use crate::settings::CYCLES_PER_SAMPLE;
-use crate::uart;
+use crate::{totals, uart};
 
 /// True once the emulated board is in use.
 static ACTIVE: AtomicBool = AtomicBool::new(false);
-/// The emulated pins: duty in the lower half, dump valve above.
-static PINS: AtomicU32 = AtomicU32::new(0);
 /// Link bytes that must have arrived before the sample's work.
 static EXPECTED: AtomicU32 = AtomicU32::new(0);
 /// Instructions to waste in the sample's work.
@@ -49,7 +49,7 @@ pub struct EmulatedActuators;
 pub fn start(rig: &USART3, counter: &TIM2) -> (EmulatedSensors, EmulatedActuators) {
     // SAFETY: UE, TE, RE, RXNEIE (RM0090, 30.6.4).
     rig.cr1()
-        .write(|w| unsafe { w.bits((1 << 13 | 1 << 3 | 1 << 2 | uart::RXNEIE) as _) });
+        .write(|w| unsafe { w.bits(1 << 13 | 1 << 3 | 1 << 2 | uart::RXNEIE) });
     // With `-icount shift=0` the timer counts instructions.
     // SAFETY: no prescaler (18.4.11).
     counter.psc().write(|w| unsafe { w.bits(0) });
@@ -84,16 +84,11 @@ pub fn instructions() -> u32 {
     unsafe { (*TIM2::ptr()).cnt().read().bits() }
 }
 
-/// Dumps the emulated brake.
-pub fn dump() {
-    PINS.store(0, Ordering::Relaxed);
-}
-
 /// What the emulated pins say.
 pub fn output() -> BrakeOutput {
-    let pins = PINS.load(Ordering::Relaxed);
+    let pins = EMULATED_PINS.load(Ordering::Relaxed);
     BrakeOutput {
-        valve_duty: pins as u16,
+        valve_duty: low_u16(pins),
         hold_pressure: pins & DUMP_VALVE != 0,
     }
 }
@@ -108,14 +103,14 @@ impl Sensors for EmulatedSensors {
     }
 
     fn dump(&mut self) {
-        crate::fault::dump();
+        dump();
     }
 }
 
 impl Actuators for EmulatedActuators {
     fn actuate(&mut self, output: BrakeOutput) {
         let valve = if output.hold_pressure { DUMP_VALVE } else { 0 };
-        PINS.store(u32::from(output.valve_duty) | valve, Ordering::Relaxed);
+        EMULATED_PINS.store(u32::from(output.valve_duty) | valve, Ordering::Relaxed);
     }
 
     fn feed_watchdog(&mut self) {}
@@ -130,7 +125,8 @@ pub fn await_link() {
     while is_active()
         && (uart::totals()
             .0
-            .wrapping_sub(EXPECTED.load(Ordering::Relaxed)) as i32)
+            .wrapping_sub(EXPECTED.load(Ordering::Relaxed)))
+        .cast_signed()
             < 0
     {
         cortex_m::asm::wfi();
@@ -226,7 +222,7 @@ pub fn say(message: &FromFirmware) {
     // QEMU's UART is always ready, and each look at its status costs QEMU more than the byte.
     for &byte in frame {
         // SAFETY: any byte may be sent.
-        rig.dr().write(|w| unsafe { w.bits(u16::from(byte) as _) });
+        rig.dr().write(|w| unsafe { w.bits(u16::from(byte)) });
     }
 }
 
@@ -238,8 +234,8 @@ fn USART3() {
     let Some(reader) = receiver else {
         return;
     };
-    while rig.sr().read().bits() as u32 & uart::RXNE != 0 {
-        let byte = rig.dr().read().bits() as u8;
+    while rig.sr().read().bits() & uart::RXNE != 0 {
+        let byte = low_u8(rig.dr().read().bits());
         if let Some(Ok(message)) = reader.push::<ToFirmware>(byte) {
             obey(&message);
         }
@@ -266,7 +262,7 @@ fn obey(message: &ToFirmware) {
         ToFirmware::FreeRun { raw, samples, burn } => {
             put(raw, *burn);
             uart::allow(u32::MAX);
-            crate::run::reset_totals();
+            totals::reset();
             FREE_SAMPLES.store(*samples, Ordering::Relaxed);
             FREE_RUN.store(true, Ordering::Relaxed);
             FREE_START.store(instructions(), Ordering::Relaxed);

@@ -4,12 +4,23 @@
 //! chip it adds the two boards, the interrupts and the main loop. One image serves both boards; which it runs
 //! on is decided at start-up by one bit (see docs/design/0005-controller.md).
 #![no_std]
-#![cfg_attr(not(test), deny(clippy::indexing_slicing))]
+#![cfg_attr(
+    not(test),
+    deny(
+        clippy::indexing_slicing,
+        clippy::float_cmp,
+        clippy::cast_possible_truncation,
+        clippy::cast_possible_wrap,
+        clippy::cast_precision_loss,
+        clippy::cast_sign_loss
+    )
+)]
 #![deny(
     clippy::undocumented_unsafe_blocks,
     clippy::allow_attributes_without_reason
 )]
 
+mod bits;
 pub mod log_ring;
 pub mod settings;
 pub mod valves;
@@ -20,6 +31,8 @@ pub mod board;
 mod cell;
 #[cfg(target_os = "none")]
 mod chip;
+#[cfg(target_os = "none")]
+mod dump;
 #[cfg(target_os = "none")]
 mod emulator;
 #[cfg(target_os = "none")]
@@ -32,5 +45,7 @@ mod queue;
 pub mod run;
 #[cfg(target_os = "none")]
 mod stack;
+#[cfg(target_os = "none")]
+mod totals;
 #[cfg(target_os = "none")]
 mod uart;

@@ -15,8 +15,9 @@ use crate::cell::InterruptCell;
 use crate::emulator::{self, Took};
 use crate::queue::{self, Sender, Taker};
 use crate::settings::CYCLES_PER_SAMPLE;
+use crate::totals::{LATE, RAISED, WORKED, count};
 use crate::uart::LinkEnd;
-use crate::{board, fault, stack, uart};
+use crate::{board, dump, stack, uart};
 
 /// Samples that may wait for the main loop; more than one is already a missed deadline.
 const WAITING_SAMPLES: usize = 4;
@@ -25,12 +26,6 @@ const SAMPLES_PER_STACK_CHECK: u32 = 64;
 
 /// True while the main loop works on a sample.
 static WORKING: AtomicBool = AtomicBool::new(false);
-/// Samples raised.
-static RAISED: AtomicU32 = AtomicU32::new(0);
-/// Samples raised while the one before was not done.
-static LATE: AtomicU32 = AtomicU32::new(0);
-/// Samples worked on.
-static WORKED: AtomicU32 = AtomicU32::new(0);
 /// Cycles of the last sampling interrupt, and the most of any.
 static INTERRUPT: AtomicU32 = AtomicU32::new(0);
 static WORST_INTERRUPT: AtomicU32 = AtomicU32::new(0);
@@ -41,13 +36,6 @@ struct Sampler {
 }
 
 static SAMPLER: InterruptCell<Sampler> = InterruptCell::new();
-
-/// Forgets the totals, for a run to be counted by itself.
-pub fn reset_totals() {
-    for total in [&RAISED, &LATE, &WORKED] {
-        total.store(0, Ordering::Relaxed);
-    }
-}
 
 /// The sampling interrupt, 1,000 times a second by the timer or once for each frame of the emulator.
 #[exception]
@@ -75,12 +63,6 @@ fn SysTick() {
     if took > WORST_INTERRUPT.load(Ordering::Relaxed) {
         WORST_INTERRUPT.store(took, Ordering::Relaxed);
     }
-}
-
-/// Adds one to a counter that only one context writes.
-fn count(counter: &AtomicU32) {
-    let sum = counter.load(Ordering::Relaxed).wrapping_add(1);
-    counter.store(sum, Ordering::Relaxed);
 }
 
 /// Takes samples for ever.
@@ -116,7 +98,7 @@ pub fn run(started: Started) -> ! {
         .run()
     }
     // Start-up failed, which it cannot: brake dumped, watchdog unfed.
-    fault::dump();
+    dump::dump();
     loop {
         cortex_m::asm::nop();
     }
@@ -167,7 +149,7 @@ impl Loop {
         let start = board::cycles();
         let output = self.controller.control(raw);
         // What the interrupt has dumped stays dumped until the controller itself says so.
-        let output = if fault::dumped(output == BrakeOutput::DUMPED) {
+        let output = if dump::dumped(output == BrakeOutput::DUMPED) {
             BrakeOutput::DUMPED
         } else {
             output

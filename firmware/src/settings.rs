@@ -1,5 +1,7 @@
 //! Figures that registers are set from.
 
+use crate::bits::low_u16;
+
 /// Core clock in Hz once the PLL runs.
 pub const CORE_HZ: u32 = 168_000_000;
 /// Core clock in Hz of the internal oscillator, before that and where the crystal fails.
@@ -27,12 +29,12 @@ pub const PLL: [u32; 4] = [8, 336, 2, 7];
 /// the fraction. The link's 921,600 come out as 913,043, 0.9 % slow; on the internal oscillator 2.1 % fast. Receivers
 /// allow some 3 %.
 pub const fn baud_divisor(clock_hz: u32, baud: u32) -> u16 {
-    ((clock_hz + baud / 2) / baud) as u16
+    low_u16((clock_hz + baud / 2) / baud)
 }
 
 /// The supply of the valves in mV from the converter's 12 bits.
 pub const fn supply_mv(code: u16) -> u16 {
-    (code as u32 * SUPPLY_FULL_SCALE_MV / 4096) as u16
+    low_u16(code as u32 * SUPPLY_FULL_SCALE_MV / 4096)
 }
 
 /// Calls `condition` until it holds, at most `limit` times; whether it did. Every wait on hardware is one of

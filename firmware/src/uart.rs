@@ -7,9 +7,11 @@ use muslip_control::link::Transmit;
 use muslip_record::LINK_BAUD;
 use stm32f4::stm32f405::{Interrupt, NVIC, RCC, USART1, USART2, interrupt};
 
+use crate::bits::low_u8;
 use crate::cell::InterruptCell;
 use crate::queue::{self, Sender, Taker};
 use crate::settings::{APB1_HZ, APB2_HZ, HSI_HZ, LOG_BAUD, baud_divisor};
+use crate::totals::add;
 
 /// Received bytes that may wait: five samples of a full wire.
 const RECEIVE_BYTES: usize = 512;
@@ -17,16 +19,16 @@ const RECEIVE_BYTES: usize = 512;
 const TRANSMIT_BYTES: usize = 2048;
 
 /// Bits of a USART's SR and CR1 (RM0090, 30.6).
-pub const RXNE: u32 = 1 << 5;
+pub const RXNE: u16 = 1 << 5;
 /// Transmit register empty.
-pub const TXE: u32 = 1 << 7;
-const ORE: u32 = 1 << 3;
-const UE: u32 = 1 << 13;
-const TXEIE: u32 = 1 << 7;
+pub const TXE: u16 = 1 << 7;
+const ORE: u16 = 1 << 3;
+const UE: u16 = 1 << 13;
+const TXEIE: u16 = 1 << 7;
 /// Receive interrupt enable.
-pub const RXNEIE: u32 = 1 << 5;
-const TE: u32 = 1 << 3;
-const RE: u32 = 1 << 2;
+pub const RXNEIE: u16 = 1 << 5;
+const TE: u16 = 1 << 3;
+const RE: u16 = 1 << 2;
 
 /// Bytes received on the link so far.
 static RECEIVED: AtomicU32 = AtomicU32::new(0);
@@ -126,15 +128,15 @@ pub fn start(rcc: &RCC, log: &USART1, link: USART2, full_clock: bool) -> Option<
         .modify(|r, w| unsafe { w.bits(r.bits() | 1 << 4) });
     // SAFETY: mantissa and fraction (30.6.3).
     log.brr()
-        .write(|w| unsafe { w.bits(u32::from(baud_divisor(log_hz, LOG_BAUD)) as _) });
+        .write(|w| unsafe { w.bits(baud_divisor(log_hz, LOG_BAUD)) });
     // SAFETY: bits of 30.6.4.
-    log.cr1().write(|w| unsafe { w.bits((UE | TE) as _) });
+    log.cr1().write(|w| unsafe { w.bits(UE | TE) });
     // SAFETY: mantissa and fraction.
     link.brr()
-        .write(|w| unsafe { w.bits(u32::from(baud_divisor(link_hz, LINK_BAUD)) as _) });
+        .write(|w| unsafe { w.bits(baud_divisor(link_hz, LINK_BAUD)) });
     // SAFETY: bits of 30.6.4.
     link.cr1()
-        .write(|w| unsafe { w.bits((UE | TE | RE | RXNEIE) as _) });
+        .write(|w| unsafe { w.bits(UE | TE | RE | RXNEIE) });
 
     let received = cortex_m::singleton!(: Queue<u8, RECEIVE_BYTES> = Queue::new())?;
     let transmit = cortex_m::singleton!(: Queue<u8, TRANSMIT_BYTES> = Queue::new())?;
@@ -161,14 +163,14 @@ pub fn start(rcc: &RCC, log: &USART1, link: USART2, full_clock: bool) -> Option<
     reason = "raw register values, and what the interrupt owns"
 )]
 pub fn pump_log(log: &USART1) -> bool {
-    if crate::log::is_empty() || log.sr().read().bits() as u32 & TXE == 0 {
+    if crate::log::is_empty() || log.sr().read().bits() & TXE == 0 {
         return false;
     }
     let Some(byte) = crate::log::pop() else {
         return false;
     };
     // SAFETY: any byte may be sent.
-    log.dr().write(|w| unsafe { w.bits(u16::from(byte) as _) });
+    log.dr().write(|w| unsafe { w.bits(u16::from(byte)) });
     true
 }
 
@@ -190,12 +192,12 @@ impl Line {
     )]
     fn service(&mut self) {
         loop {
-            let status = self.uart.sr().read().bits() as u32;
+            let status = self.uart.sr().read().bits();
             if status & (RXNE | ORE) == 0 {
                 break;
             }
             // Reading the data after the status clears both flags.
-            let byte = self.uart.dr().read().bits() as u8;
+            let byte = low_u8(self.uart.dr().read().bits());
             if status & ORE != 0 {
                 add(&OVERRUN, 1);
             }
@@ -206,14 +208,12 @@ impl Line {
                 add(&RECEIVED, 1);
             }
         }
-        while self.uart.sr().read().bits() as u32 & TXE != 0 && allowed() {
+        while self.uart.sr().read().bits() & TXE != 0 && allowed() {
             let Some(byte) = self.transmit.pop() else {
                 break;
             };
             // SAFETY: any byte may be sent.
-            self.uart
-                .dr()
-                .write(|w| unsafe { w.bits(u16::from(byte) as _) });
+            self.uart.dr().write(|w| unsafe { w.bits(u16::from(byte)) });
             add(&SENT, 1);
             if PACED.load(Ordering::Relaxed) {
                 let left = ALLOWANCE.load(Ordering::Relaxed);
@@ -222,20 +222,14 @@ impl Line {
         }
         let more = self.transmit.ready() && allowed();
         self.uart.cr1().modify(|r, w| {
-            let bits = r.bits() as u32;
+            let bits = r.bits();
             let bits = if more { bits | TXEIE } else { bits & !TXEIE };
             // SAFETY: one bit changes, to a value it may have.
-            unsafe { w.bits(bits as _) }
+            unsafe { w.bits(bits) }
         });
     }
 }
 
 fn allowed() -> bool {
     !PACED.load(Ordering::Relaxed) || ALLOWANCE.load(Ordering::Relaxed) > 0
-}
-
-/// Adds to a counter that only one context writes.
-fn add(counter: &AtomicU32, amount: u32) {
-    let sum = counter.load(Ordering::Relaxed).wrapping_add(amount);
-    counter.store(sum, Ordering::Relaxed);
 }

@@ -4,6 +4,8 @@ use embedded_hal::digital::OutputPin;
 use embedded_hal::pwm::SetDutyCycle;
 use muslip_control::brake::BrakeOutput;
 
+use crate::bits::low_u16;
+
 /// A proportional valve on a PWM and a dump valve on a pin that is high to hold pressure.
 #[derive(Debug)]
 pub struct Valves<P, D> {
@@ -29,7 +31,7 @@ impl<P: SetDutyCycle, D: OutputPin> Valves<P, D> {
         }
         let most = u32::from(self.proportional.max_duty_cycle());
         // Below 2^32: both factors have 16 bits.
-        let duty = (u32::from(output.valve_duty) * most / u32::from(u16::MAX)) as u16;
+        let duty = low_u16(u32::from(output.valve_duty) * most / u32::from(u16::MAX));
         let held = self.proportional.set_duty_cycle(duty).is_ok();
         let _ = if held {
             self.dump.set_high()

@@ -18,6 +18,8 @@
 use crc::{CRC_16_IBM_3740, Crc, Table};
 use embedded_hal::spi::SpiDevice;
 
+use crate::number::whole_u32;
+
 /// Bytes of a frame: four words of 24 bits.
 pub const FRAME_BYTES: usize = 12;
 
@@ -37,6 +39,8 @@ const REGISTER_GAIN: u8 = 0x04;
 /// Gain calibration of channel 0, upper 16 of 24 bits; the lower 8 are in the register after it.
 const REGISTER_GAIN_CALIBRATION_0: u8 = 0x0C;
 const REGISTER_GAIN_CALIBRATION_1: u8 = 0x11;
+/// Register value that changes nothing: 2^23.
+const GAIN_CALIBRATION_OF_1: f32 = 8_388_608.0;
 
 /// Upper byte of the ID register: two channels.
 const ID_TWO_CHANNELS: u16 = 0x22;
@@ -164,9 +168,9 @@ impl<SPI: SpiDevice> Ads131m02<SPI> {
                 return Err(AdcError::GainCalibration);
             }
             // Exact: the factor has 24 bits, and so has the register.
-            let bits = (factor * (1 << 23) as f32) as u32;
-            self.write(register, (bits >> 8) as u16)?;
-            self.write(register + 1, (bits << 8) as u16)?;
+            let [_, high, middle, low] = whole_u32(factor * GAIN_CALIBRATION_OF_1).to_be_bytes();
+            self.write(register, u16::from_be_bytes([high, middle]))?;
+            self.write(register + 1, u16::from_be_bytes([low, 0]))?;
         }
         Ok(())
     }

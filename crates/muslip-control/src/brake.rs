@@ -3,6 +3,8 @@
 use muslip_record::BrakeParameters;
 use serde::{Deserialize, Serialize};
 
+use crate::number::whole_u16;
+
 /// What the valves are told.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct BrakeOutput {
@@ -25,8 +27,7 @@ impl BrakeOutput {
             let share = demand.min(1.0);
             let duty = brake.duty_at_zero + (brake.duty_at_full - brake.duty_at_zero) * share;
             Self {
-                // Saturates at both ends.
-                valve_duty: (duty * f32::from(u16::MAX)) as u16,
+                valve_duty: whole_u16(duty * f32::from(u16::MAX)),
                 hold_pressure: true,
             }
         } else {

@@ -301,7 +301,7 @@ impl Controller {
         Hello {
             protocol_version: PROTOCOL_VERSION,
             schema_hash: SCHEMA_HASH,
-            sample_rate_hz: SAMPLE_RATE_HZ as u16,
+            sample_rate_hz: SAMPLE_RATE_HZ,
             core_clock_hz: self.identity.core_clock_hz,
             emulated: self.identity.emulated,
         }

@@ -5,6 +5,7 @@ use muslip_record::{ForceParameters, Parameters};
 
 use crate::board::RawSample;
 use crate::encoder::{Speed, SpeedMeter};
+use crate::number::nearest_signed;
 
 /// Samples that a tare averages.
 pub const TARE_SAMPLES: u16 = 256;
@@ -68,13 +69,14 @@ impl Conversion {
 
 /// Force in N: (code - zero) · scale. Codes of 24 bits and their differences are exact in `f32`'s 24.
 fn force_n(code: i32, force: &ForceParameters) -> f32 {
-    code.saturating_sub(force.zero_code) as f32 * force.newton_per_code
+    nearest_signed(code.saturating_sub(force.zero_code)) * force.newton_per_code
 }
 
 /// The mean of bridge codes over [`TARE_SAMPLES`].
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Tare {
-    sums: [i64; 2],
+    /// 256 codes of 24 bits are 32 bits at most.
+    sums: [i32; 2],
     samples: u16,
 }
 
@@ -82,11 +84,11 @@ impl Tare {
     /// Takes a sample; both zeros once there are enough.
     pub fn push(&mut self, codes: [i32; 2]) -> Option<[i32; 2]> {
         for (sum, code) in self.sums.iter_mut().zip(codes) {
-            *sum += i64::from(code);
+            *sum = sum.saturating_add(code);
         }
         self.samples += 1;
         // Rounds towards minus infinity: half a code is far below the converter's noise.
-        (self.samples >= TARE_SAMPLES).then(|| self.sums.map(|sum| (sum >> 8) as i32))
+        (self.samples >= TARE_SAMPLES).then(|| self.sums.map(|sum| sum >> 8))
     }
 }
 

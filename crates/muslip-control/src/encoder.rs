@@ -13,12 +13,13 @@
 
 use crate::EDGE_TIMER_HZ;
 use crate::board::EncoderReading;
+use crate::number::nearest;
 use muslip_record::EncoderParameters;
 
 /// Time without a pulse after which an encoder stands still, in s.
 pub const STANDSTILL_S: f32 = 0.25;
 
-const TICK_S: f32 = 1.0 / EDGE_TIMER_HZ as f32;
+const TICK_S: f32 = 1.0 / nearest(EDGE_TIMER_HZ);
 const STANDSTILL_TICKS: u32 = EDGE_TIMER_HZ / 4;
 
 /// Edges up to the last rising one, from a counter in quadrature mode that counts both edges of channel A
@@ -96,7 +97,7 @@ impl SpeedMeter {
                 } else {
                     f32::from(pulses)
                 };
-                self.measured_rad_s = forward * self.radians_per_pulse / (period as f32 * TICK_S);
+                self.measured_rad_s = forward * self.radians_per_pulse / (nearest(period) * TICK_S);
             }
             self.speed_rad_s = self.measured_rad_s;
         }
@@ -114,7 +115,7 @@ impl SpeedMeter {
                 pulsed,
             };
         }
-        let age_s = reading.age_ticks as f32 * TICK_S;
+        let age_s = nearest(reading.age_ticks) * TICK_S;
         if !pulsed {
             let bound = self.radians_per_pulse / age_s.max(TICK_S);
             // Not `clamp`, which panics where the bounds are not in order.

@@ -15,7 +15,17 @@
 //! `embedded-hal` 1.0 ([`ads131m02`]) and `embedded-storage` ([`store`]).
 #![no_std]
 #![forbid(unsafe_code)]
-#![cfg_attr(not(test), deny(clippy::indexing_slicing))]
+#![cfg_attr(
+    not(test),
+    deny(
+        clippy::indexing_slicing,
+        clippy::float_cmp,
+        clippy::cast_possible_truncation,
+        clippy::cast_possible_wrap,
+        clippy::cast_precision_loss,
+        clippy::cast_sign_loss
+    )
+)]
 
 pub mod ads131m02;
 pub mod board;
@@ -27,6 +37,7 @@ pub mod encoder;
 pub mod estimation;
 pub mod interlock;
 pub mod link;
+mod number;
 pub mod sequence;
 pub mod slip_hold;
 pub mod store;

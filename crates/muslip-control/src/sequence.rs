@@ -23,6 +23,7 @@ use muslip_record::{Fault, Profile, Program, State};
 
 use crate::SAMPLE_S;
 use crate::interlock::LOCK_SPEED_M_S;
+use crate::number::{nearest, whole_u16};
 
 /// Slip within which a wheel rolls freely.
 pub const ROLLING_SLIP: f32 = 0.05;
@@ -179,7 +180,7 @@ impl Sequence {
                 }
             }
             State::Ramp => {
-                let into_s = self.samples as f32 * SAMPLE_S;
+                let into_s = nearest(self.samples) * SAMPLE_S;
                 let demand = match &profile.program {
                     Program::Ramp { demand_per_s } => Some((demand_per_s * into_s).min(1.0))
                         .filter(|_| into_s * demand_per_s < 1.5),
@@ -190,7 +191,7 @@ impl Sequence {
                     } => levels
                         .iter()
                         .take(usize::from(*count))
-                        .nth((into_s / hold_s) as usize)
+                        .nth(usize::from(whole_u16(into_s / hold_s)))
                         .copied(),
                     Program::SlipHold {
                         target_slip,
@@ -212,7 +213,7 @@ impl Sequence {
                 }
             }
             State::Skid => {
-                if observed.stop || slow || self.samples as f32 * SAMPLE_S > profile.skid_hold_s {
+                if observed.stop || slow || nearest(self.samples) * SAMPLE_S > profile.skid_hold_s {
                     self.enter(State::Release);
                 } else {
                     return self.held_demand;
@@ -229,7 +230,7 @@ impl Sequence {
             State::Cool => {
                 if observed.stop {
                     self.enter(State::Done);
-                } else if self.samples as f32 * SAMPLE_S >= profile.cool_s {
+                } else if nearest(self.samples) * SAMPLE_S >= profile.cool_s {
                     if self.applications < profile.applications {
                         self.enter(State::SpinUp);
                     } else {

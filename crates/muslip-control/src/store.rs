@@ -24,6 +24,7 @@ const MAGIC: u32 = 0x4D55_0001;
 const HEADER_BYTES: usize = 12;
 const CRC_BYTES: usize = 4;
 const PAYLOAD_BYTES: usize = SLOT_BYTES - HEADER_BYTES - CRC_BYTES;
+const BODY_BYTES: u32 = address(SLOT_BYTES - CRC_BYTES);
 
 static CRC: Crc<u32, Table<1>> = Crc::<u32, Table<1>>::new(&CRC_32_ISO_HDLC);
 
@@ -42,6 +43,16 @@ pub enum StoreError<E> {
 #[derive(Debug)]
 pub struct Store<F> {
     flash: F,
+}
+
+/// Addresses of flash have 32 bits.
+#[expect(
+    clippy::cast_possible_truncation,
+    reason = "only used of constants, at compile time, where the assertion stops the build"
+)]
+const fn address(bytes: usize) -> u32 {
+    assert!(bytes < 1 << 31);
+    bytes as u32
 }
 
 struct Newest {
@@ -63,7 +74,7 @@ impl<F: NorFlash> Store<F> {
     }
 
     fn sector_bytes() -> u32 {
-        F::ERASE_SIZE as u32
+        const { address(F::ERASE_SIZE) }
     }
 
     /// The newest parameters that are whole and within their ranges; none on a blank flash.
@@ -114,7 +125,7 @@ impl<F: NorFlash> Store<F> {
             .ok_or(StoreError::TooLong)?;
         self.flash.write(address, body).map_err(StoreError::Flash)?;
         self.flash
-            .write(address + body.len() as u32, checksum)
+            .write(address + BODY_BYTES, checksum)
             .map_err(StoreError::Flash)?;
         if self.slot(address)? == slot {
             Ok(())
@@ -167,10 +178,8 @@ fn fill(slot: &mut [u8; SLOT_BYTES], sequence: u32, parameters: &Parameters) -> 
     let length = postcard::to_slice(parameters, payload.get_mut(..PAYLOAD_BYTES)?)
         .ok()?
         .len();
-    for (place, word) in header
-        .chunks_exact_mut(4)
-        .zip([MAGIC, sequence, length as u32])
-    {
+    let length = u32::try_from(length).ok()?;
+    for (place, word) in header.chunks_exact_mut(4).zip([MAGIC, sequence, length]) {
         place.copy_from_slice(&word.to_le_bytes());
     }
     *checksum = CRC.checksum(body).to_le_bytes();

@@ -46,8 +46,8 @@ pub fn parameters(p: &Parameters) -> Result<(), u8> {
         positive(p.slip_control.integral_time_s),
         positive(p.slip_control.maximum_torque_rate_nm_s),
     ];
-    match checks.iter().position(|&good| !good) {
-        Some(index) => Err(index as u8),
+    match (0..).zip(checks).find(|(_, good)| !good) {
+        Some((number, _)) => Err(number),
         None => Ok(()),
     }
 }

@@ -129,7 +129,7 @@ pub struct Hello {
     /// [`SCHEMA_HASH`](crate::SCHEMA_HASH) of the controller.
     pub schema_hash: u32,
     /// Samples a second.
-    pub sample_rate_hz: u16,
+    pub sample_rate_hz: u32,
     /// Core clock in Hz.
     pub core_clock_hz: u32,
     /// True in the emulator, where sensors and brake are simulated.

@@ -2,7 +2,7 @@
 
 use stm32f4::stm32f405::{GPIOA, GPIOB, GPIOC, RCC};
 
-use super::DUMP_LINE;
+use crate::dump::DUMP_LINE;
 
 /// What a pin is.
 #[derive(Clone, Copy)]

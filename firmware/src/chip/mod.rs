@@ -6,6 +6,7 @@
 #![allow(
     unsafe_code,
     clippy::undocumented_unsafe_blocks,
+    clippy::cast_possible_truncation,
     reason = "raw register values, each from the section of RM0090 named beside it"
 )]
 
@@ -20,7 +21,7 @@ use muslip_control::board::{Actuators, NotStored, RawSample, Sensors};
 use muslip_control::brake::BrakeOutput;
 use muslip_control::store::Store;
 use muslip_record::Parameters;
-use stm32f4::stm32f405::{ADC_COMMON, ADC1, GPIOB, IWDG, Peripherals, RCC, TIM1};
+use stm32f4::stm32f405::{ADC_COMMON, ADC1, GPIOB, IWDG, Peripherals, RCC};
 
 use crate::settings::{ADC_DIVIDER_BITS, supply_mv, wait_for};
 use crate::valves::Valves;
@@ -31,8 +32,6 @@ use outputs::{DumpPin, ValvePwm};
 
 pub use clock::runs_at_full_clock;
 
-/// Line of GPIOB that holds pressure while it is high.
-const DUMP_LINE: u32 = 0;
 /// Line of GPIOB that is high while the emergency stop's loop is closed.
 const EMERGENCY_STOP_LINE: u32 = 1;
 
@@ -115,17 +114,6 @@ fn start_supply(rcc: &RCC, common: &ADC_COMMON, adc: &ADC1) {
     wait_for(100_000, || adc.sr().read().bits() & 1 << 1 != 0);
 }
 
-/// Dump valve and PWM by the shortest way; from any context, before start-up as well.
-pub fn dump() {
-    // SAFETY: BSRR and CCR1 are written whole; no other context's read-modify-write can undo it.
-    unsafe {
-        (*GPIOB::ptr())
-            .bsrr()
-            .write(|w| w.bits(1 << (DUMP_LINE + 16)));
-        (*TIM1::ptr()).ccr1().write(|w| w.bits(0));
-    }
-}
-
 impl Sensors for ChipSensors {
     fn read(&mut self) -> RawSample {
         let [wheel, vehicle] = self.encoders.read();
@@ -143,7 +131,7 @@ impl Sensors for ChipSensors {
     }
 
     fn dump(&mut self) {
-        crate::fault::dump();
+        crate::dump::dump();
     }
 }
 

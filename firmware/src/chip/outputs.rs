@@ -6,12 +6,13 @@ use embedded_hal::digital::{self, OutputPin};
 use embedded_hal::pwm::{self, SetDutyCycle};
 use stm32f4::stm32f405::{GPIOB, RCC, TIM1};
 
-use super::DUMP_LINE;
+use crate::bits::low_u16;
+use crate::dump::DUMP_LINE;
 use crate::settings::{CORE_HZ, VALVE_PWM_HZ};
 
 /// TIM1's clock divided by this keeps a period of the PWM within 16 bits.
 const PRESCALER: u32 = 4;
-const PERIOD: u16 = (CORE_HZ / PRESCALER / VALVE_PWM_HZ) as u16;
+const PERIOD: u16 = low_u16(CORE_HZ / PRESCALER / VALVE_PWM_HZ);
 
 /// The proportional valve's PWM.
 pub struct ValvePwm(TIM1);
