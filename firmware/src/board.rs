@@ -1,14 +1,54 @@
 //! Which board this is, and its start-up.
 
+use core::sync::atomic::{Ordering, compiler_fence};
+
+use cortex_m::peripheral::scb::SystemHandler;
+use cortex_m::peripheral::{NVIC, SCB};
 use muslip_control::board::{Actuators, Board, NotStored, RawSample, Sensors};
 use muslip_control::brake::BrakeOutput;
 use muslip_control::controller::{Controller, Identity};
+use muslip_control::emulation::FromFirmware;
 use muslip_record::{Parameters, SAMPLE_RATE_HZ};
-use stm32f4::stm32f405::{Peripherals, USART1};
+use stm32f4::stm32f405::{Interrupt, Peripherals, USART1};
 
+use crate::counter::{Most, cycles, is_emulated};
 use crate::settings::{CORE_HZ, HSI_HZ};
 use crate::uart::LinkEnd;
 use crate::{chip, emulator, uart};
+
+/// Priorities of the interrupts, in the upper four bits of their registers: 0 goes first.
+const LINK_PRIORITY: u8 = 0;
+const SAMPLING_PRIORITY: u8 = 1;
+
+/// Does something with sampling held off, and the link not.
+pub fn without_sampling<T>(work: impl FnOnce() -> T) -> T {
+    let start = cycles();
+    #[allow(unsafe_code, reason = "a priority is masked and let go")]
+    // SAFETY: nothing relies on sampling coming within the few instructions of `work`.
+    unsafe {
+        cortex_m::register::basepri::write(SAMPLING_PRIORITY << 4);
+    }
+    // The mask holds from here on, for the core and for the compiler (ARMv7-M, B5.2.3).
+    cortex_m::asm::isb();
+    compiler_fence(Ordering::SeqCst);
+    let result = work();
+    compiler_fence(Ordering::SeqCst);
+    HELD_OFF.take(cycles().wrapping_sub(start));
+    #[allow(unsafe_code, reason = "a priority is masked and let go")]
+    // SAFETY: 0 masks nothing.
+    unsafe {
+        cortex_m::register::basepri::write(0);
+    }
+    result
+}
+
+/// Most cycles for which sampling was held off by [`without_sampling`].
+static HELD_OFF: Most = Most::new();
+
+/// Most cycles for which sampling was held off to set the valves.
+pub fn sampling_held_off() -> u32 {
+    HELD_OFF.get()
+}
 
 /// The board, whichever it is.
 pub struct AnyBoard {
@@ -156,16 +196,6 @@ pub fn start() -> Started {
     }
 }
 
-/// Core cycles, or instructions in the emulator; wraps.
-#[inline]
-pub fn cycles() -> u32 {
-    if emulator::is_active() {
-        emulator::instructions()
-    } else {
-        cortex_m::peripheral::DWT::cycle_count()
-    }
-}
-
 /// Lets samples come: by the timer on the chip, by the simulator's frames in the emulator.
 #[allow(
     unsafe_code,
@@ -174,16 +204,24 @@ pub fn cycles() -> u32 {
 pub fn start_sampling() {
     // SAFETY: called once; nobody else has the core's peripherals.
     let mut core = unsafe { cortex_m::Peripherals::steal() };
-    // SAFETY: the sampling interrupt goes above all others; nothing relies on another order.
+    // SAFETY: the host link goes above sampling, which takes longer than its next byte; nothing relies on
+    // another order. docs/design/0013-silicon.md.
     unsafe {
-        use cortex_m::peripheral::scb::SystemHandler;
-        use stm32f4::stm32f405::Interrupt;
-        core.SCB.set_priority(SystemHandler::SysTick, 0);
-        core.NVIC.set_priority(Interrupt::USART2, 1 << 4);
+        core.NVIC
+            .set_priority(Interrupt::USART2, LINK_PRIORITY << 4);
+        core.SCB
+            .set_priority(SystemHandler::SysTick, SAMPLING_PRIORITY << 4);
         core.NVIC.set_priority(Interrupt::USART3, 2 << 4);
     }
-    if emulator::is_active() {
-        emulator::say(&muslip_control::emulation::FromFirmware::Ready);
+    if is_emulated() {
+        let sampling_instructions = chip::sampling_instructions();
+        emulator::say(&FromFirmware::Ready {
+            sampling_instructions,
+            priorities: [
+                NVIC::get_priority(Interrupt::USART2) >> 4,
+                SCB::get_priority(SystemHandler::SysTick) >> 4,
+            ],
+        });
         return;
     }
     core.DCB.enable_trace();

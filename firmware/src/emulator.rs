@@ -6,18 +6,17 @@ use cortex_m::peripheral::SCB;
 use cortex_m::peripheral::syst::SystClkSource;
 use muslip_control::board::{Actuators, NotStored, RawSample, Sensors};
 use muslip_control::brake::BrakeOutput;
-use muslip_control::emulation::{FromFirmware, ToFirmware};
+use muslip_control::emulation::{Delays, FromFirmware, ToFirmware};
 use muslip_record::{FRAME_BYTES, FrameReader, Parameters, encode};
 use stm32f4::stm32f405::{Interrupt, NVIC, TIM2, USART3, interrupt};
 
 use crate::bits::{low_u8, low_u16};
 use crate::cell::InterruptCell;
+use crate::counter::{cycles, is_emulated, start_emulated};
 use crate::dump::{EMULATED_PINS, dump};
 use crate::settings::CYCLES_PER_SAMPLE;
 use crate::{totals, uart};
 
-/// True once the emulated board is in use.
-static ACTIVE: AtomicBool = AtomicBool::new(false);
 /// Link bytes that must have arrived before the sample's work.
 static EXPECTED: AtomicU32 = AtomicU32::new(0);
 /// Instructions to waste in the sample's work.
@@ -50,38 +49,16 @@ pub fn start(rig: &USART3, counter: &TIM2) -> (EmulatedSensors, EmulatedActuator
     // SAFETY: UE, TE, RE, RXNEIE (RM0090, 30.6.4).
     rig.cr1()
         .write(|w| unsafe { w.bits(1 << 13 | 1 << 3 | 1 << 2 | uart::RXNEIE) });
-    // With `-icount shift=0` the timer counts instructions.
-    // SAFETY: no prescaler (18.4.11).
-    counter.psc().write(|w| unsafe { w.bits(0) });
-    // SAFETY: all 32 bits (18.4.12).
-    counter.arr().write(|w| unsafe { w.bits(u32::MAX) });
-    // SAFETY: CEN, counting up (18.4.1).
-    counter.cr1().write(|w| unsafe { w.bits(1) });
     // SAFETY: the interrupts that use them are enabled after this.
     unsafe {
         MAILBOX.fill(RawSample::default());
         RECEIVER.fill(FrameReader::new());
     }
     uart::allow(0);
-    ACTIVE.store(true, Ordering::Relaxed);
+    start_emulated(counter);
     // SAFETY: nothing relies on this interrupt being masked.
     unsafe { NVIC::unmask(Interrupt::USART3) };
     (EmulatedSensors, EmulatedActuators)
-}
-
-/// Whether this is the emulator.
-pub fn is_active() -> bool {
-    ACTIVE.load(Ordering::Relaxed)
-}
-
-/// Instructions so far.
-#[allow(
-    unsafe_code,
-    reason = "raw register values, and what the emulator's interrupt owns"
-)]
-pub fn instructions() -> u32 {
-    // SAFETY: reading a counter has no effect.
-    unsafe { (*TIM2::ptr()).cnt().read().bits() }
 }
 
 /// What the emulated pins say.
@@ -122,7 +99,7 @@ impl Actuators for EmulatedActuators {
 
 /// Waits until the link bytes that belong before this sample have arrived.
 pub fn await_link() {
-    while is_active()
+    while is_emulated()
         && (uart::totals()
             .0
             .wrapping_sub(EXPECTED.load(Ordering::Relaxed)))
@@ -152,8 +129,8 @@ pub struct Took {
 }
 
 /// Answers the simulator after a sample's work; `totals` are samples raised, worked on and late so far.
-pub fn answer(tick: u32, took: &Took, stack_bytes: u32, totals: [u32; 3]) {
-    if !is_active() {
+pub fn answer(tick: u32, took: &Took, delays: Delays, stack_bytes: u32, totals: [u32; 3]) {
+    if !is_emulated() {
         return;
     }
     if FREE_RUN.load(Ordering::Relaxed) {
@@ -164,7 +141,7 @@ pub fn answer(tick: u32, took: &Took, stack_bytes: u32, totals: [u32; 3]) {
                 samples,
                 worked,
                 late,
-                elapsed_ns: instructions().wrapping_sub(FREE_START.load(Ordering::Relaxed)),
+                elapsed_ns: cycles().wrapping_sub(FREE_START.load(Ordering::Relaxed)),
                 output: output(),
             });
         }
@@ -176,6 +153,7 @@ pub fn answer(tick: u32, took: &Took, stack_bytes: u32, totals: [u32; 3]) {
         interrupt_instructions: took.interrupt,
         control_instructions: took.control,
         step_instructions: took.step,
+        delays,
         stack_bytes,
         link_sent: uart::totals().1,
     });
@@ -210,7 +188,7 @@ pub fn count_free_sample() {
     reason = "raw register values, and what the emulator's interrupt owns"
 )]
 pub fn say(message: &FromFirmware) {
-    if !is_active() {
+    if !is_emulated() {
         return;
     }
     let mut buffer = [0; FRAME_BYTES];
@@ -265,7 +243,7 @@ fn obey(message: &ToFirmware) {
             totals::reset();
             FREE_SAMPLES.store(*samples, Ordering::Relaxed);
             FREE_RUN.store(true, Ordering::Relaxed);
-            FREE_START.store(instructions(), Ordering::Relaxed);
+            FREE_START.store(cycles(), Ordering::Relaxed);
             // SAFETY: in the emulator nobody else uses the timer.
             let mut timer = unsafe { cortex_m::Peripherals::steal() }.SYST;
             timer.set_clock_source(SystClkSource::Core);

@@ -32,6 +32,8 @@ mod cell;
 #[cfg(target_os = "none")]
 mod chip;
 #[cfg(target_os = "none")]
+mod counter;
+#[cfg(target_os = "none")]
 mod dump;
 #[cfg(target_os = "none")]
 mod emulator;

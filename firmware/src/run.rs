@@ -7,11 +7,13 @@ use heapless::spsc::Queue;
 use muslip_control::board::{Actuators, Board, RawSample, Sensors};
 use muslip_control::brake::BrakeOutput;
 use muslip_control::controller::{Controller, Resources};
+use muslip_control::emulation::Delays;
 use muslip_record::State;
 use stm32f4::stm32f405::USART1;
 
 use crate::board::{AnyActuators, AnySensors, Started};
 use crate::cell::InterruptCell;
+use crate::counter::{Most, cycles};
 use crate::emulator::{self, Took};
 use crate::queue::{self, Sender, Taker};
 use crate::settings::CYCLES_PER_SAMPLE;
@@ -28,7 +30,9 @@ const SAMPLES_PER_STACK_CHECK: u32 = 64;
 static WORKING: AtomicBool = AtomicBool::new(false);
 /// Cycles of the last sampling interrupt, and the most of any.
 static INTERRUPT: AtomicU32 = AtomicU32::new(0);
-static WORST_INTERRUPT: AtomicU32 = AtomicU32::new(0);
+static WORST_INTERRUPT: Most = Most::new();
+/// Most cycles for which every interrupt was masked.
+static MASKED: Most = Most::new();
 
 struct Sampler {
     sensors: AnySensors,
@@ -40,7 +44,7 @@ static SAMPLER: InterruptCell<Sampler> = InterruptCell::new();
 /// The sampling interrupt, 1,000 times a second by the timer or once for each frame of the emulator.
 #[exception]
 fn SysTick() {
-    let start = board::cycles();
+    let start = cycles();
     #[allow(unsafe_code, reason = "what the sampling interrupt owns")]
     // SAFETY: only this interrupt calls it.
     let sampler = unsafe { SAMPLER.get() };
@@ -58,11 +62,9 @@ fn SysTick() {
     }
     // Full is late by more than a sample; the brake is dumped already.
     sampler.samples.push(raw);
-    let took = board::cycles().wrapping_sub(start);
+    let took = cycles().wrapping_sub(start);
     INTERRUPT.store(took, Ordering::Relaxed);
-    if took > WORST_INTERRUPT.load(Ordering::Relaxed) {
-        WORST_INTERRUPT.store(took, Ordering::Relaxed);
-    }
+    WORST_INTERRUPT.take(took);
 }
 
 /// Takes samples for ever.
@@ -129,33 +131,46 @@ impl Loop {
             if uart::pump_log(&self.log) {
                 continue;
             }
-            // With interrupts off a sample cannot slip in between the look and the sleep; a pending one
-            // still ends it.
-            cortex_m::interrupt::disable();
-            if !self.samples.ready() {
-                cortex_m::asm::wfi();
-            }
-            #[allow(unsafe_code, reason = "interrupts are switched on again")]
-            // SAFETY: they were on before.
-            unsafe {
-                cortex_m::interrupt::enable();
-            }
+            self.sleep();
+        }
+    }
+
+    /// Sleeps until the next interrupt, unless a sample waits.
+    fn sleep(&self) {
+        // With interrupts off a sample cannot slip in between the look and the sleep; a pending one
+        // still ends it.
+        cortex_m::interrupt::disable();
+        let start = cycles();
+        let ready = self.samples.ready();
+        let looked = cycles().wrapping_sub(start);
+        if !ready {
+            cortex_m::asm::wfi();
+        }
+        let awake = cycles();
+        MASKED.take(looked.wrapping_add(cycles().wrapping_sub(awake)));
+        #[allow(unsafe_code, reason = "interrupts are switched on again")]
+        // SAFETY: they were on before.
+        unsafe {
+            cortex_m::interrupt::enable();
         }
     }
 
     fn work(&mut self, raw: &RawSample) {
         WORKING.store(true, Ordering::Relaxed);
         emulator::await_link();
-        let start = board::cycles();
+        let start = cycles();
         let output = self.controller.control(raw);
-        // What the interrupt has dumped stays dumped until the controller itself says so.
-        let output = if dump::dumped(output == BrakeOutput::DUMPED) {
-            BrakeOutput::DUMPED
-        } else {
-            output
-        };
-        self.actuators.actuate(output);
-        let control = board::cycles().wrapping_sub(start);
+        // What the interrupt has dumped stays dumped until the controller itself says so; between the look and
+        // the valves it must not come.
+        board::without_sampling(|| {
+            let output = if dump::dumped(output == BrakeOutput::DUMPED) {
+                BrakeOutput::DUMPED
+            } else {
+                output
+            };
+            self.actuators.actuate(output);
+        });
+        let control = cycles().wrapping_sub(start);
         emulator::burn();
         self.controller.set_overrun_bytes(uart::overrun_bytes());
         self.controller.set_resources(self.resources);
@@ -165,7 +180,7 @@ impl Loop {
         } = &mut self.link;
         self.controller
             .communicate(|| receiver.receive(), transmitter, &mut self.actuators);
-        let step = board::cycles().wrapping_sub(start);
+        let step = cycles().wrapping_sub(start);
         self.actuators.feed_watchdog();
         WORKING.store(false, Ordering::Relaxed);
         count(&WORKED);
@@ -181,7 +196,15 @@ impl Loop {
         if worked % SAMPLES_PER_STACK_CHECK == 1 {
             self.resources.stack_used_bytes = stack::used_bytes();
         }
-        self.resources.worst_interrupt_cycles = WORST_INTERRUPT.load(Ordering::Relaxed);
+        self.resources.worst_interrupt_cycles = WORST_INTERRUPT.get();
+        let [receive, send] = uart::worst_cycles();
+        self.resources.worst_link_interrupt_cycles = receive.max(send);
+        let delays = Delays {
+            receive,
+            send,
+            masked: MASKED.get(),
+            held_off: board::sampling_held_off(),
+        };
         self.resources.worst_step_cycles = self.resources.worst_step_cycles.max(step);
         uart::kick();
         let state = self.controller.state();
@@ -200,6 +223,12 @@ impl Loop {
             step,
         };
         let totals = [&RAISED, &WORKED, &LATE].map(|total| total.load(Ordering::Relaxed));
-        emulator::answer(worked, &took, self.resources.stack_used_bytes, totals);
+        emulator::answer(
+            worked,
+            &took,
+            delays,
+            self.resources.stack_used_bytes,
+            totals,
+        );
     }
 }

@@ -9,8 +9,8 @@ use anyhow::{Context, Result, bail, ensure};
 
 use crate::figures::{figures, replaced_between};
 use crate::image::{Forbidden, Image};
-use crate::setup;
 use crate::step::{cargo, command, root, run, step};
+use crate::{latency, setup};
 
 /// Target of the image.
 const TARGET: &str = "thumbv7em-none-eabihf";
@@ -31,6 +31,8 @@ const TABLE: [&str; 2] = [
     "<!-- firmware figures -->",
     "<!-- end of firmware figures -->",
 ];
+/// Where the rig page's table of interrupts is.
+const LATENCIES: [&str; 2] = ["<!-- latencies -->", "<!-- end of latencies -->"];
 
 fn target_folder() -> PathBuf {
     std::env::var_os("CARGO_TARGET_DIR")
@@ -115,7 +117,7 @@ fn loop_command() -> Command {
     pil
 }
 
-/// Builds, checks and runs the image in QEMU; `write` puts the figures into the README.
+/// Builds, checks and runs the image in QEMU; `write` puts the figures into README and rig page.
 pub fn pil(arguments: &[String], write: bool) -> Result<()> {
     setup::run_all()?;
     budgets()?;
@@ -127,13 +129,21 @@ pub fn pil(arguments: &[String], write: bool) -> Result<()> {
         .env("RUST_BACKTRACE", "0");
     run("processor in the loop", pil)?;
     step("budgets of the runs", || {
+        let measured = figures(&fs::read_to_string(&path)?)?;
+        let latency = latency::table(&measured)?;
+        print!("{latency}");
         let table = check_runs(
-            &figures(&fs::read_to_string(&path)?)?,
+            &measured,
             &Image::read(&image_path("muslip-firmware"))?,
             &budgets_file()?,
         )?;
         print!("{table}");
-        if write { write_table(&table) } else { Ok(()) }
+        if write {
+            write_table("README.md", TABLE, &table)?;
+            write_table("docs/rig.md", LATENCIES, &latency)
+        } else {
+            Ok(())
+        }
     })
 }
 
@@ -202,10 +212,10 @@ fn check_runs(
     }
 }
 
-fn write_table(table: &str) -> Result<()> {
-    let path = root().join("README.md");
+fn write_table(file: &str, marks: [&str; 2], table: &str) -> Result<()> {
+    let path = root().join(file);
     let text = fs::read_to_string(&path)?;
-    fs::write(path, replaced_between(&text, TABLE, table)?)?;
+    fs::write(path, replaced_between(&text, marks, table)?)?;
     Ok(())
 }
 

@@ -7,6 +7,7 @@ mod estimators;
 mod figures;
 mod firmware;
 mod image;
+mod latency;
 mod mechanisms;
 mod release;
 mod setup;

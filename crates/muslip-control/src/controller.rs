@@ -40,6 +40,8 @@ pub struct Identity {
 pub struct Resources {
     /// Most cycles of one sampling interrupt.
     pub worst_interrupt_cycles: u32,
+    /// Most cycles of the host link's interrupt for one byte.
+    pub worst_link_interrupt_cycles: u32,
     /// Most cycles of one sample's work in the main loop.
     pub worst_step_cycles: u32,
     /// Deepest stack in bytes.
@@ -315,6 +317,7 @@ impl Controller {
             standing: self.standing.bits(),
             link: self.link.counters(),
             worst_interrupt_cycles: self.resources.worst_interrupt_cycles,
+            worst_link_interrupt_cycles: self.resources.worst_link_interrupt_cycles,
             worst_step_cycles: self.resources.worst_step_cycles,
             stack_used_bytes: self.resources.stack_used_bytes,
             stored: self.identity.stored,

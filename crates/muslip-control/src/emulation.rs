@@ -35,11 +35,29 @@ pub enum ToFirmware {
     HardFault,
 }
 
+/// What can hold an interrupt off, the most of each so far, in instructions.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub struct Delays {
+    /// The link's interrupt, taking one byte in.
+    pub receive: u32,
+    /// The link's interrupt, sending one byte.
+    pub send: u32,
+    /// Every interrupt masked, around the core's sleep.
+    pub masked: u32,
+    /// Sampling held off while the valves are set.
+    pub held_off: u32,
+}
+
 /// From the firmware.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub enum FromFirmware {
     /// Start-up is done.
-    Ready,
+    Ready {
+        /// Instructions of one look at the chip's own sensors, with every bus ready at once.
+        sampling_instructions: u32,
+        /// Priorities of the link's interrupt and of sampling as they are set; 0 goes first.
+        priorities: [u8; 2],
+    },
     /// A sample's work is done.
     Sample {
         /// Samples since start.
@@ -52,6 +70,8 @@ pub enum FromFirmware {
         control_instructions: u32,
         /// Instructions of the step and of the link's work after it.
         step_instructions: u32,
+        /// What can hold an interrupt off.
+        delays: Delays,
         /// Deepest stack so far in bytes.
         stack_bytes: u32,
         /// Bytes sent on the link so far.

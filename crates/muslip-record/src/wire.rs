@@ -335,6 +335,8 @@ pub struct Status {
     pub link: LinkCounters,
     /// Most cycles (instructions in the emulator) that one sampling interrupt took.
     pub worst_interrupt_cycles: u32,
+    /// Most cycles that the host link's interrupt took for one byte.
+    pub worst_link_interrupt_cycles: u32,
     /// Most cycles that one sample's work in the main loop took.
     pub worst_step_cycles: u32,
     /// Deepest stack so far in bytes.

@@ -79,6 +79,7 @@ fn the_longest_messages_fit_a_frame() {
             dropped: all,
         },
         worst_interrupt_cycles: all,
+        worst_link_interrupt_cycles: all,
         worst_step_cycles: all,
         stack_used_bytes: all,
         stored: true,

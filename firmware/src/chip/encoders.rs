@@ -91,6 +91,11 @@ impl Encoders {
         start_counter!(vehicle, vehicle_high);
         start_stamp!(wheel_stamp);
         start_stamp!(vehicle_stamp);
+        Self::untouched(wheel, vehicle, wheel_stamp, vehicle_stamp)
+    }
+
+    /// Both encoders on timers as they are.
+    pub fn untouched(wheel: TIM3, vehicle: TIM4, wheel_stamp: TIM5, vehicle_stamp: TIM2) -> Self {
         Self {
             wheel,
             vehicle,

@@ -23,6 +23,7 @@ use muslip_control::store::Store;
 use muslip_record::Parameters;
 use stm32f4::stm32f405::{ADC_COMMON, ADC1, GPIOB, IWDG, Peripherals, RCC};
 
+use crate::counter::cycles;
 use crate::settings::{ADC_DIVIDER_BITS, supply_mv, wait_for};
 use crate::valves::Valves;
 use bridge::Bridge;
@@ -112,6 +113,22 @@ fn start_supply(rcc: &RCC, common: &ADC_COMMON, adc: &ADC1) {
     wait_for(1_000, || false);
     adc.cr2().write(|w| unsafe { w.bits(1 | 1 << 30) });
     wait_for(100_000, || adc.sr().read().bits() & 1 << 1 != 0);
+}
+
+/// Instructions of one look at the sensors, counted in the emulator, where every bus is ready at once and the bridge's
+/// first frame, of no converter, is refused: for docs/rig.md, which adds the second frame and all waits.
+pub fn sampling_instructions() -> u32 {
+    // SAFETY: only called in the emulator, before sampling, where none of these is in use.
+    let p = unsafe { Peripherals::steal() };
+    let mut sensors = ChipSensors {
+        encoders: Encoders::untouched(p.TIM3, p.TIM4, p.TIM5, p.TIM2),
+        bridge: Bridge::untouched(p.SPI2),
+        adc: p.ADC1,
+        ports: p.GPIOB,
+    };
+    let start = cycles();
+    core::hint::black_box(sensors.read());
+    cycles().wrapping_sub(start)
 }
 
 impl Sensors for ChipSensors {

@@ -6,7 +6,7 @@ use std::path::Path;
 use anyhow::{Result, bail, ensure};
 use muslip_control::board::RawSample;
 use muslip_control::brake::BrakeOutput;
-use muslip_control::emulation::FromFirmware;
+use muslip_control::emulation::{Delays, FromFirmware};
 use muslip_record::{
     Answer, Command, Envelope, FrameReader, LINK_BYTES_PER_SECOND, Parameters, Profile,
     SAMPLE_RATE_HZ, State, Telemetry,
@@ -26,8 +26,38 @@ pub const WIRE_BYTES: u16 = (LINK_BYTES_PER_SECOND / SAMPLE_RATE_HZ) as u16;
 pub struct Worst {
     /// Instructions of the sampling interrupt, the control step, and the step with the link's work.
     pub instructions: [u32; 3],
+    /// What can hold an interrupt off.
+    pub delays: Delays,
+    /// Instructions of one look at the chip's own sensors.
+    pub sensors: u32,
+    /// Priorities of the link's interrupt and of sampling; 0 goes first.
+    pub priorities: [u8; 2],
     /// Stack in bytes.
     pub stack_bytes: u32,
+}
+
+impl Worst {
+    /// The larger of each.
+    #[must_use]
+    pub fn most(self, other: Self) -> Self {
+        let mut instructions = self.instructions;
+        for (most, other) in instructions.iter_mut().zip(other.instructions) {
+            *most = (*most).max(other);
+        }
+        let (a, b) = (self.delays, other.delays);
+        Self {
+            instructions,
+            delays: Delays {
+                receive: a.receive.max(b.receive),
+                send: a.send.max(b.send),
+                masked: a.masked.max(b.masked),
+                held_off: a.held_off.max(b.held_off),
+            },
+            sensors: self.sensors.max(other.sensors),
+            priorities: [0, 1].map(|at: usize| self.priorities[at].max(other.priorities[at])),
+            stack_bytes: self.stack_bytes.max(other.stack_bytes),
+        }
+    }
 }
 
 /// Everything together.
@@ -68,7 +98,13 @@ impl Bench {
     /// The image does not come up.
     pub fn start(image: &Path, law: &str, seed: u64) -> Result<Self> {
         let (qemu, first) = Qemu::start(image)?;
-        ensure!(first == FromFirmware::Ready, "at start-up: {first:?}");
+        let FromFirmware::Ready {
+            sampling_instructions,
+            priorities,
+        } = first
+        else {
+            bail!("at start-up: {first:?}");
+        };
         Ok(Self {
             qemu,
             native: Native::new()?,
@@ -80,7 +116,11 @@ impl Bench {
             brake: BrakeOutput::DUMPED,
             samples: 0,
             estimates_compared: 0,
-            worst: Worst::default(),
+            worst: Worst {
+                sensors: sampling_instructions,
+                priorities,
+                ..Worst::default()
+            },
             step_instructions: 0,
             room: WIRE_BYTES,
             burn: 0,
@@ -92,12 +132,20 @@ impl Bench {
     /// # Errors
     /// The image is gone, or differs from the native controller.
     pub fn sample(&mut self) -> Result<()> {
+        let link = self.host.outgoing()?;
+        self.sample_with(&link)
+    }
+
+    /// One sample with these bytes on the link instead of the host's own.
+    ///
+    /// # Errors
+    /// As [`Bench::sample`].
+    pub fn sample_with(&mut self, link: &[u8]) -> Result<()> {
         let raw = self.rig.sample(self.brake);
         self.raw = raw;
-        let link = self.host.outgoing()?;
         let input = Input {
             raw,
-            link: &link,
+            link,
             room: self.room,
             burn: self.burn,
         };
@@ -105,13 +153,19 @@ impl Bench {
         let native = self.native.sample(&input)?;
         self.samples += 1;
         self.compare(&output, &native)?;
-        if self.burn == 0 {
-            for (worst, took) in self.worst.instructions.iter_mut().zip(output.instructions) {
-                *worst = (*worst).max(took);
-            }
-        }
+        self.worst = self.worst.most(Worst {
+            // What is wasted on purpose does not count.
+            instructions: if self.burn == 0 {
+                output.instructions
+            } else {
+                [0; 3]
+            },
+            delays: output.delays,
+            sensors: 0,
+            priorities: [0; 2],
+            stack_bytes: output.stack_bytes,
+        });
         self.step_instructions += u64::from(output.instructions[2]);
-        self.worst.stack_bytes = self.worst.stack_bytes.max(output.stack_bytes);
         self.brake = output.brake;
         self.host.incoming(&output.link);
         Ok(())

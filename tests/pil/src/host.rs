@@ -93,6 +93,19 @@ impl Host {
         self.sequence
     }
 
+    /// The frame of a command that nobody waits for.
+    ///
+    /// # Errors
+    /// It does not fit.
+    pub fn framed(&mut self, command: Command) -> Result<Vec<u8>> {
+        self.sequence = self.sequence.wrapping_add(1);
+        let envelope = Envelope {
+            sequence: self.sequence,
+            body: command,
+        };
+        Ok(encode(&envelope, &mut [0; FRAME_BYTES])?.to_vec())
+    }
+
     /// Whether a command waits for its answer.
     pub fn waits(&self) -> bool {
         self.open.is_some()
@@ -115,12 +128,7 @@ impl Host {
                 bytes.extend_from_slice(encode(&Envelope { sequence, body }, &mut buffer)?);
             }
         } else if self.alive && self.samples.is_multiple_of(self.keep_alive_samples) {
-            self.sequence = self.sequence.wrapping_add(1);
-            let envelope = Envelope {
-                sequence: self.sequence,
-                body: Command::KeepAlive,
-            };
-            bytes.extend_from_slice(encode(&envelope, &mut buffer)?);
+            bytes = self.framed(Command::KeepAlive)?;
         }
         self.samples += 1;
         if !bytes.is_empty() {

@@ -8,11 +8,12 @@ use std::time::Instant;
 
 use anyhow::{Context, Result, bail};
 use clap::Parser;
+use muslip_control::emulation::Delays;
 use muslip_record::Parameters;
 use pil::bench::Worst;
 use pil::qemu::Qemu;
 use pil::rig::Rig;
-use pil::scenarios::{self, CYCLES_PER_SAMPLE, Found, WORK_PERCENT, most};
+use pil::scenarios::{self, CYCLES_PER_SAMPLE, Found, WORK_PERCENT};
 use pil::serve::Pace;
 
 /// Processor in the loop: the firmware's image in QEMU, in lock-step with the rig simulator.
@@ -58,6 +59,7 @@ fn main() -> Result<()> {
         ("steps", Box::new(|| scenarios::steps(image))),
         ("slip hold", Box::new(|| scenarios::slip_hold(image))),
         ("interlocks", Box::new(|| scenarios::interlocks(image))),
+        ("byte by byte", Box::new(|| scenarios::byte_by_byte(image))),
         ("corruption", Box::new(|| scenarios::corruption(image))),
         (
             "back pressure",
@@ -86,7 +88,7 @@ fn main() -> Result<()> {
         let start = Instant::now();
         match scenario() {
             Ok(found) => {
-                worst = most(worst, found.worst);
+                worst = worst.most(found.worst);
                 println!(
                     "ok    {name}: {} ({:.1} s)",
                     found.line,
@@ -111,9 +113,18 @@ fn main() -> Result<()> {
     println!("deepest stack: {} bytes", worst.stack_bytes);
     if let Some(path) = &arguments.figures {
         let [interrupt, control, step] = worst.instructions;
-        let stack = worst.stack_bytes;
+        let [link, sampling] = worst.priorities;
+        let (stack, sensors) = (worst.stack_bytes, worst.sensors);
+        let Delays {
+            receive,
+            send,
+            masked,
+            held_off,
+        } = worst.delays;
         let text = format!(
-            "interrupt = {interrupt}\ncontrol = {control}\nstep = {step}\nstack = {stack}\n"
+            "interrupt = {interrupt}\ncontrol = {control}\nstep = {step}\nstack = {stack}\n\
+             sensors = {sensors}\nreceive = {receive}\nsend = {send}\nmasked = {masked}\n\
+             held_off = {held_off}\nlink_priority = {link}\nsampling_priority = {sampling}\n"
         );
         std::fs::write(path, text).with_context(|| path.display().to_string())?;
     }

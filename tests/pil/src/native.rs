@@ -6,6 +6,7 @@ use anyhow::{Result, anyhow};
 use muslip_control::board::{Actuators, NotStored};
 use muslip_control::brake::BrakeOutput;
 use muslip_control::controller::{Controller, Identity};
+use muslip_control::emulation::Delays;
 use muslip_control::link::Transmit;
 use muslip_record::Parameters;
 
@@ -84,6 +85,7 @@ impl Target for Native {
             brake,
             link: self.transmit.0.drain(..sent).collect(),
             instructions: [0; 3],
+            delays: Delays::default(),
             stack_bytes: 0,
         })
     }

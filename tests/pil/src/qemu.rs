@@ -219,6 +219,7 @@ impl Target for Qemu {
                 interrupt_instructions,
                 control_instructions,
                 step_instructions,
+                delays,
                 stack_bytes,
                 link_sent,
                 ..
@@ -234,6 +235,7 @@ impl Target for Qemu {
                         control_instructions,
                         step_instructions,
                     ],
+                    delays,
                     stack_bytes,
                 })
             }

@@ -3,6 +3,7 @@
 use anyhow::Result;
 use muslip_control::board::RawSample;
 use muslip_control::brake::BrakeOutput;
+use muslip_control::emulation::Delays;
 
 /// One sample's input beside the sensors.
 #[derive(Debug, Clone, Copy)]
@@ -26,6 +27,8 @@ pub struct Output {
     pub link: Vec<u8>,
     /// Instructions of sampling interrupt, control step, and step with the link's work; 0 natively.
     pub instructions: [u32; 3],
+    /// What can hold an interrupt off, so far; 0 natively.
+    pub delays: Delays,
     /// Deepest stack so far in bytes; 0 natively.
     pub stack_bytes: u32,
 }

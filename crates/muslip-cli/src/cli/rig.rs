@@ -248,10 +248,12 @@ fn print_status(status: &Status, terminal: &mut Terminal) -> Result<(), Failure>
         ),
         ("telemetry dropped", link.dropped.to_string()),
         (
-            "worst cycles, interrupt and step",
+            "worst cycles: sampling, link's byte, step",
             format!(
-                "{}, {}",
-                status.worst_interrupt_cycles, status.worst_step_cycles
+                "{}, {}, {}",
+                status.worst_interrupt_cycles,
+                status.worst_link_interrupt_cycles,
+                status.worst_step_cycles
             ),
         ),
         (

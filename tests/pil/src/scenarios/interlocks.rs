@@ -9,7 +9,7 @@ use muslip_control::brake::BrakeOutput;
 use muslip_control::interlock::{LOCK_TIME_S, SILENT_SAMPLES};
 use muslip_record::{Answer, Command, Fault, Parameters, Profile, Program, Refusal, State};
 
-use super::{CYCLES_PER_SAMPLE, Found, LAW, RAMP, most};
+use super::{CYCLES_PER_SAMPLE, Found, LAW, RAMP};
 use crate::bench::{Bench, Worst};
 use crate::rig::Trouble;
 
@@ -175,7 +175,7 @@ pub fn interlocks(image: &Path) -> Result<Found> {
             "{fault:?}: dumped after {held} samples of its condition, {all} after its cause"
         );
         lines.push(format!("{fault:?} {held} ({all})"));
-        worst = most(worst, bench.worst);
+        worst = worst.most(bench.worst);
     }
     Ok(Found {
         line: format!(

@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use anyhow::{Result, bail, ensure};
+use muslip_control::emulation::Delays;
 use muslip_record::{
     Answer, Command, Event, PROTOCOL_VERSION, Profile, Refusal, SCHEMA_HASH, State,
 };
@@ -37,6 +38,37 @@ pub fn greets(image: &Path) -> Result<Found> {
             .is_some_and(|s| s.state == State::Armed)
     );
     Ok(found(&bench, format!("schema {SCHEMA_HASH:08x}")))
+}
+
+/// One byte a sample in each direction, as the chip's UART moves them: what one byte costs the link's interrupt, and
+/// no byte is lost.
+pub fn byte_by_byte(image: &Path) -> Result<Found> {
+    let mut bench = Bench::start(image, LAW, 13)?;
+    bench.run(20)?;
+    bench.room = 1;
+    bench.host.alive = false;
+    let frame = bench.host.framed(Command::Hello)?;
+    for &byte in &frame {
+        bench.sample_with(&[byte])?;
+    }
+    bench.room = crate::bench::WIRE_BYTES;
+    bench.host.alive = true;
+    bench.run(100)?;
+    bench.must(Command::ReadStatus)?;
+    let Some(status) = bench.host.heard.status else {
+        bail!("no status");
+    };
+    ensure!(bench.host.heard.hello.is_some(), "no hello");
+    ensure!(
+        status.link.overrun_bytes == 0 && status.link.corrupt == 0,
+        "{status:?}"
+    );
+    let Delays { receive, send, .. } = bench.worst.delays;
+    ensure!(receive > 0 && send > 0, "{:?}", bench.worst);
+    Ok(found(
+        &bench,
+        format!("a byte in {receive}, a byte out {send} instructions"),
+    ))
 }
 
 /// A tenth of all link bytes is changed, both ways, and the run goes on as if nothing were.

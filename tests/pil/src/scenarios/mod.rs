@@ -15,7 +15,7 @@ use crate::bench::{Bench, Worst};
 
 pub use chip::{endurance, fault_handlers, free_run, log};
 pub use interlocks::interlocks;
-pub use link::{back_pressure, corruption, greets};
+pub use link::{back_pressure, byte_by_byte, corruption, greets};
 pub use runs::{full_lock, ramps, slip_hold, steps};
 
 /// Cycles that a sample has at 168 MHz.
@@ -46,17 +46,5 @@ fn found(bench: &Bench, line: String) -> Found {
     Found {
         line,
         worst: bench.worst,
-    }
-}
-
-/// The larger of each.
-pub fn most(a: Worst, b: Worst) -> Worst {
-    let mut instructions = a.instructions;
-    for (most, other) in instructions.iter_mut().zip(b.instructions) {
-        *most = (*most).max(other);
-    }
-    Worst {
-        instructions,
-        stack_bytes: a.stack_bytes.max(b.stack_bytes),
     }
 }

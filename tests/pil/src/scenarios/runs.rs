@@ -6,7 +6,7 @@ use anyhow::{Result, bail, ensure};
 use muslip_control::brake::BrakeOutput;
 use muslip_record::{Event, Parameters, Profile, Program, STEPS, State};
 
-use super::{Found, LAW, RAMP, found, most};
+use super::{Found, LAW, RAMP, found};
 use crate::bench::{Bench, Worst};
 
 /// Two ramps: the skid is found and released, the estimate is near the truth and the same as natively.
@@ -160,7 +160,7 @@ pub fn slip_hold(image: &Path) -> Result<Found> {
             "{estimate:?}"
         );
         lines.push(format!("{target_slip}: within 20 % after {settled} ms, then mean {mean:.4}, at most {largest:.4} off"));
-        worst = most(worst, bench.worst);
+        worst = worst.most(bench.worst);
     }
     Ok(Found {
         line: lines.join("; "),
