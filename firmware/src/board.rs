@@ -8,7 +8,8 @@ use muslip_control::board::{Actuators, Board, NotStored, RawSample, Sensors};
 use muslip_control::brake::BrakeOutput;
 use muslip_control::controller::{Controller, Identity};
 use muslip_control::emulation::FromFirmware;
-use muslip_record::{Parameters, SAMPLE_RATE_HZ};
+use muslip_control::store::Loaded;
+use muslip_record::{Origin, Parameters, SAMPLE_RATE_HZ};
 use stm32f4::stm32f405::{Interrupt, Peripherals, USART1};
 
 use crate::counter::{Most, cycles, is_emulated};
@@ -153,7 +154,7 @@ pub fn start() -> Started {
             emulated,
             watchdog_reset: false,
             slow_clock: false,
-            stored: false,
+            parameters: Origin::BuiltIn,
         };
         (board, identity, Parameters::default())
     } else {
@@ -167,9 +168,16 @@ pub fn start() -> Started {
             emulated,
             watchdog_reset: up.watchdog_reset,
             slow_clock: !up.full_clock,
-            stored: up.parameters.is_some(),
+            parameters: match up.loaded {
+                Some(Loaded { newest: true, .. }) => Origin::Stored,
+                Some(_) => Origin::Previous,
+                None => Origin::BuiltIn,
+            },
         };
-        (board, identity, up.parameters.unwrap_or_default())
+        let parameters = up
+            .loaded
+            .map_or_else(Parameters::default, |loaded| loaded.parameters);
+        (board, identity, parameters)
     };
     let link = uart::start(
         &peripherals.RCC,
@@ -178,11 +186,11 @@ pub fn start() -> Started {
         !identity.slow_clock,
     );
     defmt::info!(
-        "muslip: emulated {}, core {} Hz, watchdog reset {}, parameters stored {}",
+        "muslip: emulated {}, core {} Hz, watchdog reset {}, parameters {}",
         identity.emulated,
         identity.core_clock_hz,
         identity.watchdog_reset,
-        identity.stored
+        identity.parameters
     );
     // Stored parameters were checked when they were loaded, the default ones by a test.
     let controller = Controller::new(&parameters, identity)

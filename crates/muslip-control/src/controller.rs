@@ -3,8 +3,8 @@
 use heapless::Vec;
 use muslip::sample::RigSample;
 use muslip_record::{
-    Answer, Command, Event, Fault, Hello, PROTOCOL_VERSION, Parameters, Refusal, SAMPLE_RATE_HZ,
-    SAMPLES_PER_ESTIMATE, SCHEMA_HASH, Sample, State, Status, Telemetry,
+    Answer, Command, Event, Fault, Hello, Origin, PROTOCOL_VERSION, Parameters, Refusal,
+    SAMPLE_RATE_HZ, SAMPLES_PER_ESTIMATE, SCHEMA_HASH, Sample, State, Status, Telemetry,
 };
 
 use crate::board::{Actuators, BridgeQuality, NotStored, RawSample};
@@ -31,8 +31,8 @@ pub struct Identity {
     pub watchdog_reset: bool,
     /// The core runs slower than it should.
     pub slow_clock: bool,
-    /// The parameters are those in flash.
-    pub stored: bool,
+    /// Where the parameters come from.
+    pub parameters: Origin,
 }
 
 /// What the work has taken so far.
@@ -231,7 +231,7 @@ impl Controller {
         }
         if core::mem::take(&mut self.tared) {
             // Zeros that cannot be stored still hold until the next reset.
-            self.identity.stored = actuators.store(&self.parameters).is_ok();
+            self.store(actuators).ok();
         }
         // By reference: the queue's own iterator has an index that may panic.
         for &(tick, event) in &core::mem::take(&mut self.events) {
@@ -320,7 +320,7 @@ impl Controller {
             worst_link_interrupt_cycles: self.resources.worst_link_interrupt_cycles,
             worst_step_cycles: self.resources.worst_step_cycles,
             stack_used_bytes: self.resources.stack_used_bytes,
-            stored: self.identity.stored,
+            parameters: self.identity.parameters,
         }
     }
 
@@ -329,6 +329,9 @@ impl Controller {
         let standing = self.standing.without(Fault::LinkSilent);
         if self.tick == 0 {
             return Err(Refusal::WrongState(self.sequence.state()));
+        }
+        if !self.identity.parameters.is_confirmed() {
+            return Err(Refusal::Unconfirmed);
         }
         if self.tare.is_some() {
             return Err(Refusal::Moving);
@@ -387,6 +390,10 @@ impl Controller {
         if !self.sequence.is_at_rest() {
             return Err(Refusal::WrongState(self.sequence.state()));
         }
+        // A tare stores all parameters: it must not make a rig's of those that are nobody's.
+        if !self.identity.parameters.is_confirmed() {
+            return Err(Refusal::Unconfirmed);
+        }
         if !self.stands_still() {
             return Err(Refusal::Moving);
         }
@@ -434,11 +441,14 @@ impl Controller {
         self.conversion = Conversion::new(parameters);
         self.interlocks = Interlocks::new(parameters);
         self.tare = None;
-        self.identity.stored = false;
-        actuators
-            .store(parameters)
-            .map_err(|NotStored| Refusal::Storage)?;
-        self.identity.stored = true;
+        self.store(actuators).map_err(|NotStored| Refusal::Storage)
+    }
+
+    /// Stores the parameters in use, which somebody has just set.
+    fn store(&mut self, actuators: &mut impl Actuators) -> Result<(), NotStored> {
+        self.identity.parameters = Origin::Unstored;
+        actuators.store(&self.parameters)?;
+        self.identity.parameters = Origin::Stored;
         Ok(())
     }
 

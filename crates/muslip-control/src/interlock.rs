@@ -116,14 +116,9 @@ pub struct Interlocks {
 impl Interlocks {
     /// With these parameters' limits.
     pub fn new(parameters: &Parameters) -> Self {
-        let wheel = &parameters.wheel;
-        // Brake at full torque with half as much again, and the tyre at a friction of 1.5.
-        let torque_nm = 1.5
-            * (parameters.brake.torque_at_full_nm
-                + parameters.limits.maximum_force_n * wheel.effective_radius_m);
         Self {
             parameters: *parameters,
-            wheel_change_rad_s2: torque_nm / wheel.inertia_kg_m2,
+            wheel_change_rad_s2: wheel_change_rad_s2(parameters),
             vehicle_change_rad_s2: VEHICLE_CHANGE_M_S2 / parameters.vehicle_encoder_radius_m,
             locked_s: 0.0,
             last_wheel_rad_s: 0.0,
@@ -226,6 +221,15 @@ impl Interlocks {
             Fault::NormalForceLost,
         );
     }
+}
+
+/// Fastest change of the wheel's speed in rad/s²: brake at full torque with half as much again, and the tyre at a
+/// friction of 1.5.
+pub fn wheel_change_rad_s2(parameters: &Parameters) -> f32 {
+    let wheel = &parameters.wheel;
+    1.5 * (parameters.brake.torque_at_full_nm
+        + parameters.limits.maximum_force_n * wheel.effective_radius_m)
+        / wheel.inertia_kg_m2
 }
 
 #[derive(PartialEq, Eq)]

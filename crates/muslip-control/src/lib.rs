@@ -30,6 +30,7 @@
 pub mod ads131m02;
 pub mod board;
 pub mod brake;
+pub mod ceiling;
 pub mod controller;
 pub mod conversion;
 pub mod emulation;

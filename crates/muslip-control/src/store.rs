@@ -4,27 +4,30 @@
 //! erased and begun. A slot is
 //!
 //! ```text
-//! magic ‖ sequence ‖ length | postcard, padded with zeros | CRC-32 over all before it
+//! magic ‖ sequence ‖ schema hash ‖ length | postcard, padded with zeros | CRC-32 over all before it
 //! ```
 //!
-//! written in that order, checksum last. The valid slot with the highest sequence counts. A slot torn by a cut
-//! has no valid checksum and is passed over; so has a sector torn while it was erased, whose slots were older
-//! anyway.
+//! written in that order, checksum last. Of the slots that are whole, of this schema and of this length, the one with
+//! the highest sequence counts. A slot torn by a cut has no valid checksum and is passed over; so has a sector torn
+//! while it was erased, whose slots were older anyway. Where something newer than the slot that counts is not whole or
+//! of another schema, [`Loaded::newest`] says so: what was set last is lost.
+
+use core::iter::StepBy;
+use core::ops::Range;
 
 use crc::{CRC_32_ISO_HDLC, Crc, Table};
 use embedded_storage::nor_flash::NorFlash;
-use muslip_record::Parameters;
+use muslip_record::{PARAMETERS_HASH, Parameters};
 
 use crate::validate;
 
 /// Bytes of a slot.
 pub const SLOT_BYTES: usize = 256;
 
-const MAGIC: u32 = 0x4D55_0001;
-const HEADER_BYTES: usize = 12;
+const MAGIC: u32 = 0x4D55_0002;
+const HEADER_BYTES: usize = 16;
 const CRC_BYTES: usize = 4;
 const PAYLOAD_BYTES: usize = SLOT_BYTES - HEADER_BYTES - CRC_BYTES;
-const BODY_BYTES: u32 = address(SLOT_BYTES - CRC_BYTES);
 
 static CRC: Crc<u32, Table<1>> = Crc::<u32, Table<1>>::new(&CRC_32_ISO_HDLC);
 
@@ -50,21 +53,42 @@ pub struct Store<F> {
     clippy::cast_possible_truncation,
     reason = "only used of constants, at compile time, where the assertion stops the build"
 )]
-const fn address(bytes: usize) -> u32 {
+const fn address_of(bytes: usize) -> u32 {
     assert!(bytes < 1 << 31);
     bytes as u32
 }
 
-struct Newest {
+/// Parameters out of flash.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Loaded {
+    /// The parameters.
+    pub parameters: Parameters,
+    /// False where newer ones were written or begun, and cannot be read.
+    pub newest: bool,
+}
+
+/// What a slot holds.
+enum Content {
+    /// Nothing was ever written.
+    Blank,
+    /// Something, but no whole slot.
+    Torn,
+    /// A whole slot with its sequence, and parameters where they are of this schema and in their ranges.
+    Whole(u32, Option<Parameters>),
+}
+
+/// A slot and where it is.
+struct Place<T> {
     sequence: u32,
     address: u32,
+    content: T,
 }
 
 impl<F: NorFlash> Store<F> {
     /// A store on a flash of exactly two sectors.
     pub fn new(flash: F) -> Self {
         const { assert!(F::ERASE_SIZE.is_multiple_of(SLOT_BYTES)) };
-        const { assert!(SLOT_BYTES.is_multiple_of(F::WRITE_SIZE)) };
+        const { assert!(SLOT_BYTES.is_multiple_of(F::WRITE_SIZE) && F::WRITE_SIZE < SLOT_BYTES) };
         Self { flash }
     }
 
@@ -74,23 +98,70 @@ impl<F: NorFlash> Store<F> {
     }
 
     fn sector_bytes() -> u32 {
-        const { address(F::ERASE_SIZE) }
+        const { address_of(F::ERASE_SIZE) }
     }
 
-    /// The newest parameters that are whole and within their ranges; none on a blank flash.
+    /// Bytes that are written last, checksum in them: a word of the flash, or the checksum.
+    const LAST_BYTES: usize = if F::WRITE_SIZE > CRC_BYTES {
+        F::WRITE_SIZE
+    } else {
+        CRC_BYTES
+    };
+
+    /// The newest parameters that are whole, of this schema and within their ranges; none on a blank flash.
     ///
     /// # Errors
     /// [`StoreError::Flash`].
-    pub fn load(&mut self) -> Result<Option<Parameters>, StoreError<F::Error>> {
-        let Some(newest) = self.newest()? else {
+    pub fn load(&mut self) -> Result<Option<Loaded>, StoreError<F::Error>> {
+        let mut best: Option<Place<Parameters>> = None;
+        let mut highest = 0;
+        for address in Self::slots(0..2) {
+            let Content::Whole(sequence, parameters) = self.content(address)? else {
+                continue;
+            };
+            highest = highest.max(sequence);
+            if let Some(content) = parameters
+                && best.as_ref().is_none_or(|best| sequence > best.sequence)
+            {
+                best = Some(Place {
+                    sequence,
+                    address,
+                    content,
+                });
+            }
+        }
+        let Some(best) = best else {
             return Ok(None);
         };
-        let slot = self.slot(newest.address)?;
-        Ok(slot
-            .get(HEADER_BYTES..)
-            .and_then(|payload| postcard::take_from_bytes::<Parameters>(payload).ok())
-            .map(|(parameters, _)| parameters)
-            .filter(|parameters| validate::parameters(parameters).is_ok()))
+        let newest = highest == best.sequence && !self.is_torn_after(best.address)?;
+        Ok(Some(Loaded {
+            parameters: best.content,
+            newest,
+        }))
+    }
+
+    /// Whether a slot was begun where the next after an address would be.
+    fn is_torn_after(&mut self, address: u32) -> Result<bool, StoreError<F::Error>> {
+        let sector = address / Self::sector_bytes();
+        let next = address + const { address_of(SLOT_BYTES) };
+        let after = if next == (sector + 1) * Self::sector_bytes() {
+            // The sector is full: the next one goes into the other.
+            Self::slots(1 - sector.min(1)..2 - sector.min(1))
+        } else {
+            (next..(sector + 1) * Self::sector_bytes()).step_by(SLOT_BYTES)
+        };
+        for address in after {
+            if matches!(self.content(address)?, Content::Torn) {
+                return Ok(true);
+            }
+        }
+        Ok(false)
+    }
+
+    /// Addresses of all slots of these sectors.
+    fn slots(sectors: Range<u32>) -> StepBy<Range<u32>> {
+        let bytes = Self::sector_bytes();
+        (sectors.start * bytes..sectors.end * bytes).step_by(SLOT_BYTES)
     }
 
     /// Saves parameters; on return they are what [`Store::load`] answers.
@@ -120,12 +191,15 @@ impl<F: NorFlash> Store<F> {
                 start
             }
         };
-        let (body, checksum) = slot
-            .split_at_checked(SLOT_BYTES - CRC_BYTES)
+        let (body, last) = slot
+            .split_at_checked(SLOT_BYTES - Self::LAST_BYTES)
             .ok_or(StoreError::TooLong)?;
         self.flash.write(address, body).map_err(StoreError::Flash)?;
         self.flash
-            .write(address + BODY_BYTES, checksum)
+            .write(
+                address + const { address_of(SLOT_BYTES - Self::LAST_BYTES) },
+                last,
+            )
             .map_err(StoreError::Flash)?;
         if self.slot(address)? == slot {
             Ok(())
@@ -142,16 +216,24 @@ impl<F: NorFlash> Store<F> {
         Ok(slot)
     }
 
-    fn newest(&mut self) -> Result<Option<Newest>, StoreError<F::Error>> {
-        let mut newest: Option<Newest> = None;
-        for address in (0..2 * Self::sector_bytes()).step_by(SLOT_BYTES) {
-            let slot = self.slot(address)?;
-            if let Some(sequence) = sequence_of(&slot)
+    fn content(&mut self, address: u32) -> Result<Content, StoreError<F::Error>> {
+        Ok(content(&self.slot(address)?))
+    }
+
+    /// The whole slot with the highest sequence, whatever its schema.
+    fn newest(&mut self) -> Result<Option<Place<()>>, StoreError<F::Error>> {
+        let mut newest: Option<Place<()>> = None;
+        for address in Self::slots(0..2) {
+            if let Content::Whole(sequence, _) = self.content(address)?
                 && newest
                     .as_ref()
                     .is_none_or(|newest| sequence > newest.sequence)
             {
-                newest = Some(Newest { sequence, address });
+                newest = Some(Place {
+                    sequence,
+                    address,
+                    content: (),
+                });
             }
         }
         Ok(newest)
@@ -159,10 +241,9 @@ impl<F: NorFlash> Store<F> {
 
     /// The first slot of a sector with nothing written in it or after it.
     fn blank_slot(&mut self, sector: u32) -> Result<Option<u32>, StoreError<F::Error>> {
-        let start = sector * Self::sector_bytes();
         let mut blank = None;
-        for address in (start..start + Self::sector_bytes()).step_by(SLOT_BYTES) {
-            if self.slot(address)?.iter().all(|&byte| byte == 0xFF) {
+        for address in Self::slots(sector..sector + 1) {
+            if matches!(self.content(address)?, Content::Blank) {
                 blank = blank.or(Some(address));
             } else {
                 blank = None;
@@ -179,19 +260,48 @@ fn fill(slot: &mut [u8; SLOT_BYTES], sequence: u32, parameters: &Parameters) -> 
         .ok()?
         .len();
     let length = u32::try_from(length).ok()?;
-    for (place, word) in header.chunks_exact_mut(4).zip([MAGIC, sequence, length]) {
+    for (place, word) in header
+        .chunks_exact_mut(4)
+        .zip([MAGIC, sequence, PARAMETERS_HASH, length])
+    {
         place.copy_from_slice(&word.to_le_bytes());
     }
     *checksum = CRC.checksum(body).to_le_bytes();
     Some(())
 }
 
-/// The sequence of a slot that is whole.
-fn sequence_of(slot: &[u8; SLOT_BYTES]) -> Option<u32> {
+fn content(slot: &[u8; SLOT_BYTES]) -> Content {
+    if slot.iter().all(|&byte| byte == 0xFF) {
+        return Content::Blank;
+    }
+    match whole(slot) {
+        Some((sequence, parameters)) => Content::Whole(sequence, parameters),
+        None => Content::Torn,
+    }
+}
+
+/// Sequence and parameters of a slot that is whole.
+fn whole(slot: &[u8; SLOT_BYTES]) -> Option<(u32, Option<Parameters>)> {
     let (body, checksum) = slot.split_last_chunk::<CRC_BYTES>()?;
-    let (magic, rest) = body.split_first_chunk::<4>()?;
-    let (sequence, _) = rest.split_first_chunk::<4>()?;
-    let whole =
-        u32::from_le_bytes(*magic) == MAGIC && CRC.checksum(body) == u32::from_le_bytes(*checksum);
-    whole.then(|| u32::from_le_bytes(*sequence))
+    let (header, payload) = body.split_first_chunk::<HEADER_BYTES>()?;
+    let (words, _) = header.as_chunks::<4>();
+    let [magic, sequence, schema, length] = words else {
+        return None;
+    };
+    let [magic, sequence, schema, length] =
+        [magic, sequence, schema, length].map(|word| u32::from_le_bytes(*word));
+    if magic != MAGIC || CRC.checksum(body) != u32::from_le_bytes(*checksum) {
+        return None;
+    }
+    let parameters = (schema == PARAMETERS_HASH)
+        .then(|| decoded(payload, length))
+        .flatten();
+    Some((sequence, parameters))
+}
+
+/// Parameters of exactly so many bytes and within their ranges.
+fn decoded(payload: &[u8], length: u32) -> Option<Parameters> {
+    let bytes = payload.get(..usize::try_from(length).ok()?)?;
+    let (parameters, rest) = postcard::take_from_bytes::<Parameters>(bytes).ok()?;
+    (rest.is_empty() && validate::parameters(&parameters).is_ok()).then_some(parameters)
 }

@@ -2,40 +2,41 @@
 
 use muslip_record::{Parameters, Profile, Program};
 
-use crate::interlock::LOCK_SPEED_M_S;
+use crate::ceiling;
+use crate::interlock::{LOCK_SPEED_M_S, wheel_change_rad_s2};
 
 /// The first field outside its range, in the order of the type's fields counted from 0.
 ///
 /// # Errors
 /// That number.
 pub fn parameters(p: &Parameters) -> Result<(), u8> {
-    let within = |value: f32, low: f32, high: f32| value >= low && value <= high;
     let positive = |value: f32| value > 0.0 && value.is_finite();
     let pulses = |pulses: u16| (1..=10_000).contains(&pulses);
-    let scale = |scale: f32| scale != 0.0 && scale.is_finite();
+    let scale = |scale: f32| ceiling::NEWTON_PER_CODE.allows(scale.abs());
     let code = |code: i32| code.unsigned_abs() < 1 << 23;
     let checks = [
-        within(p.wheel.effective_radius_m, 0.005, 2.0),
-        positive(p.wheel.inertia_kg_m2),
+        ceiling::EFFECTIVE_RADIUS_M.allows(p.wheel.effective_radius_m),
+        ceiling::INERTIA_KG_M2.allows(p.wheel.inertia_kg_m2),
         positive(p.wheel.vehicle_mass_kg),
         pulses(p.wheel_encoder.pulses_per_revolution),
         true,
         pulses(p.vehicle_encoder.pulses_per_revolution),
         true,
-        within(p.vehicle_encoder_radius_m, 0.005, 10.0),
+        ceiling::VEHICLE_ENCODER_RADIUS_M.allows(p.vehicle_encoder_radius_m),
         scale(p.drag.newton_per_code),
         code(p.drag.zero_code),
         scale(p.normal.newton_per_code),
         code(p.normal.zero_code),
         p.brake.duty_at_zero >= 0.0,
         p.brake.duty_at_full > p.brake.duty_at_zero && p.brake.duty_at_full <= 1.0,
-        positive(p.brake.torque_at_full_nm),
-        positive(p.limits.maximum_vehicle_speed_m_s),
-        positive(p.limits.maximum_wheel_speed_rad_s),
-        positive(p.limits.minimum_normal_force_n),
-        positive(p.limits.maximum_force_n)
-            && p.limits.maximum_force_n > p.limits.minimum_normal_force_n,
-        positive(p.limits.minimum_supply_v),
+        ceiling::TORQUE_AT_FULL_NM.allows(p.brake.torque_at_full_nm),
+        ceiling::MAXIMUM_VEHICLE_SPEED_M_S.allows(p.limits.maximum_vehicle_speed_m_s),
+        ceiling::MAXIMUM_WHEEL_SPEED_RAD_S.allows(p.limits.maximum_wheel_speed_rad_s),
+        ceiling::MINIMUM_NORMAL_FORCE_N.allows(p.limits.minimum_normal_force_n),
+        ceiling::MAXIMUM_FORCE_N.allows(p.limits.maximum_force_n)
+            && p.limits.maximum_force_n > p.limits.minimum_normal_force_n
+            && ceiling::WHEEL_CHANGE_RAD_S2.allows(wheel_change_rad_s2(p)),
+        ceiling::MINIMUM_SUPPLY_V.allows(p.limits.minimum_supply_v),
         true,
         positive(p.estimator.friction_std),
         positive(p.estimator.noise_inflation),
@@ -106,6 +107,67 @@ mod tests {
             refused(|p| p.slip_control.integral_time_s = f32::INFINITY),
             Err(26)
         );
+    }
+
+    #[test]
+    fn no_limit_that_an_interlock_uses_can_be_set_so_that_it_never_fires() {
+        type Set = fn(&mut Parameters, f32);
+        let limits: [(u8, ceiling::Ceiling, Set); 11] = [
+            (0, ceiling::EFFECTIVE_RADIUS_M, |p, v| {
+                p.wheel.effective_radius_m = v;
+            }),
+            (1, ceiling::INERTIA_KG_M2, |p, v| p.wheel.inertia_kg_m2 = v),
+            (7, ceiling::VEHICLE_ENCODER_RADIUS_M, |p, v| {
+                p.vehicle_encoder_radius_m = v;
+            }),
+            (8, ceiling::NEWTON_PER_CODE, |p, v| {
+                p.drag.newton_per_code = -v;
+            }),
+            (10, ceiling::NEWTON_PER_CODE, |p, v| {
+                p.normal.newton_per_code = v;
+            }),
+            (14, ceiling::TORQUE_AT_FULL_NM, |p, v| {
+                p.brake.torque_at_full_nm = v;
+            }),
+            (15, ceiling::MAXIMUM_VEHICLE_SPEED_M_S, |p, v| {
+                p.limits.maximum_vehicle_speed_m_s = v;
+            }),
+            (16, ceiling::MAXIMUM_WHEEL_SPEED_RAD_S, |p, v| {
+                p.limits.maximum_wheel_speed_rad_s = v;
+            }),
+            (17, ceiling::MINIMUM_NORMAL_FORCE_N, |p, v| {
+                p.limits.minimum_normal_force_n = v;
+            }),
+            (18, ceiling::MAXIMUM_FORCE_N, |p, v| {
+                p.limits.maximum_force_n = v;
+            }),
+            (19, ceiling::MINIMUM_SUPPLY_V, |p, v| {
+                p.limits.minimum_supply_v = v;
+            }),
+        ];
+        for (field, limit, set) in limits {
+            for value in [
+                limit.lowest * 0.99,
+                limit.highest * 1.01,
+                0.0,
+                1e30,
+                f32::INFINITY,
+                f32::NAN,
+            ] {
+                let mut changed = Parameters::default();
+                set(&mut changed, value);
+                assert_eq!(
+                    parameters(&changed),
+                    Err(field),
+                    "{} {value}",
+                    limit.parameter
+                );
+            }
+        }
+        // Each within its range, and together a wheel that stops in a millisecond.
+        let mut together = Parameters::default();
+        together.wheel.inertia_kg_m2 = 0.05;
+        assert_eq!(parameters(&together), Err(18));
     }
 
     #[test]

@@ -4,7 +4,7 @@
 use embedded_storage::nor_flash::{
     ErrorType, NorFlash, NorFlashError, NorFlashErrorKind, ReadNorFlash,
 };
-use muslip_control::store::{SLOT_BYTES, Store};
+use muslip_control::store::{Loaded, SLOT_BYTES, Store};
 use muslip_record::Parameters;
 
 /// Sectors of eight slots, so that a test goes round often.
@@ -13,7 +13,7 @@ const SECTOR: usize = 8 * SLOT_BYTES;
 /// Flash that loses power after a number of words or erase steps, and does what real flash does: bits go
 /// from 1 to 0 by word, and from 0 to 1 by sector.
 #[derive(Clone)]
-struct Flash {
+struct Flash<const WORD: usize = 4> {
     bytes: Vec<u8>,
     /// Operations until the power is cut.
     left: usize,
@@ -39,7 +39,7 @@ impl NorFlashError for PowerCut {
     }
 }
 
-impl Flash {
+impl<const WORD: usize> Flash<WORD> {
     fn blank() -> Self {
         Self {
             bytes: vec![0xFF; 2 * SECTOR],
@@ -56,11 +56,11 @@ impl Flash {
     }
 }
 
-impl ErrorType for Flash {
+impl<const WORD: usize> ErrorType for Flash<WORD> {
     type Error = PowerCut;
 }
 
-impl ReadNorFlash for Flash {
+impl<const WORD: usize> ReadNorFlash for Flash<WORD> {
     const READ_SIZE: usize = 1;
     fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), PowerCut> {
         if self.left == 0 {
@@ -74,8 +74,8 @@ impl ReadNorFlash for Flash {
     }
 }
 
-impl NorFlash for Flash {
-    const WRITE_SIZE: usize = 4;
+impl<const WORD: usize> NorFlash for Flash<WORD> {
+    const WRITE_SIZE: usize = WORD;
     const ERASE_SIZE: usize = SECTOR;
 
     fn erase(&mut self, from: u32, to: u32) -> Result<(), PowerCut> {
@@ -96,13 +96,13 @@ impl NorFlash for Flash {
     }
 
     fn write(&mut self, offset: u32, bytes: &[u8]) -> Result<(), PowerCut> {
-        assert!(offset.is_multiple_of(4) && bytes.len().is_multiple_of(4));
-        for (index, word) in bytes.chunks(4).enumerate() {
+        assert!((offset as usize).is_multiple_of(WORD) && bytes.len().is_multiple_of(WORD));
+        for (index, word) in bytes.chunks(WORD).enumerate() {
             if self.left == 0 {
                 return Err(PowerCut);
             }
             let cut = self.cut();
-            for (place, &byte) in self.bytes[offset as usize + 4 * index..]
+            for (place, &byte) in self.bytes[offset as usize + WORD * index..]
                 .iter_mut()
                 .zip(word)
             {
@@ -128,7 +128,18 @@ fn numbered(number: u16) -> Parameters {
     parameters
 }
 
-fn loaded(flash: &Flash) -> Option<Parameters> {
+fn newest(number: u16) -> Loaded {
+    Loaded {
+        parameters: numbered(number),
+        newest: true,
+    }
+}
+
+fn loaded<const WORD: usize>(flash: &Flash<WORD>) -> Option<Parameters> {
+    everything_loaded(flash).map(|loaded| loaded.parameters)
+}
+
+fn everything_loaded<const WORD: usize>(flash: &Flash<WORD>) -> Option<Loaded> {
     let flash = Flash {
         left: usize::MAX,
         ..flash.clone()
@@ -138,21 +149,31 @@ fn loaded(flash: &Flash) -> Option<Parameters> {
 
 #[test]
 fn a_blank_flash_holds_nothing_and_the_last_save_counts() {
-    let mut flash = Flash::blank();
+    let mut flash = Flash::<4>::blank();
     assert_eq!(loaded(&flash), None);
     for number in 1..50 {
         let mut store = Store::new(flash);
         store.save(&numbered(number)).unwrap();
-        assert_eq!(store.load(), Ok(Some(numbered(number))));
+        assert_eq!(store.load(), Ok(Some(newest(number))));
         flash = store.into_inner();
     }
 }
 
 #[test]
 fn a_cut_at_every_operation_of_every_save_leaves_the_old_or_the_new_whole() {
+    let cuts = cuts_in_words_of::<4>();
+    println!("{cuts} cuts");
+    assert!(cuts > 3000);
+    // Words of other chips: STM32G4 8, STM32U5 16, STM32H7 32 bytes.
+    cuts_in_words_of::<8>();
+    cuts_in_words_of::<16>();
+    cuts_in_words_of::<32>();
+}
+
+fn cuts_in_words_of<const WORD: usize>() -> u32 {
     let mut cuts = 0;
     for torn in [Torn::Untouched, Torn::Half] {
-        let mut flash = Flash {
+        let mut flash = Flash::<WORD> {
             torn,
             ..Flash::blank()
         };
@@ -183,18 +204,17 @@ fn a_cut_at_every_operation_of_every_save_leaves_the_old_or_the_new_whole() {
                 cut.left = usize::MAX;
                 let mut again = Store::new(cut);
                 again.save(&numbered(number)).unwrap();
-                assert_eq!(again.load(), Ok(new));
+                assert_eq!(again.load(), Ok(Some(newest(number))));
             }
             flash = whole;
         }
     }
-    println!("{cuts} cuts");
-    assert!(cuts > 3000);
+    cuts
 }
 
 #[test]
 fn cuts_one_after_the_other_do_not_add_up() {
-    let mut flash = Flash::blank();
+    let mut flash = Flash::<4>::blank();
     let mut store = Store::new(flash);
     store.save(&numbered(1)).unwrap();
     flash = store.into_inner();
@@ -216,11 +236,74 @@ fn cuts_one_after_the_other_do_not_add_up() {
     }
 }
 
+/// A flash with saves of 1 to this number, each a slot after the other.
+fn saved(numbers: u16) -> Flash {
+    let mut store = Store::new(Flash::blank());
+    for number in 1..=numbers {
+        store.save(&numbered(number)).unwrap();
+    }
+    store.into_inner()
+}
+
+/// Changes a slot's bytes and makes its checksum right again.
+fn forge(flash: &mut Flash, slot: usize, change: impl FnOnce(&mut [u8])) {
+    let slot = &mut flash.bytes[slot * SLOT_BYTES..][..SLOT_BYTES];
+    let (body, checksum) = slot.split_at_mut(SLOT_BYTES - 4);
+    change(body);
+    let crc = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC);
+    checksum.copy_from_slice(&crc.checksum(body).to_le_bytes());
+}
+
+fn before_the_newest(number: u16) -> Option<Loaded> {
+    Some(Loaded {
+        newest: false,
+        ..newest(number)
+    })
+}
+
+#[test]
+fn a_newest_slot_that_has_rotted_falls_back_to_the_one_before_and_says_so() {
+    for bit in 0..SLOT_BYTES * 8 {
+        let mut flash = saved(3);
+        assert_eq!(everything_loaded(&flash), Some(newest(3)));
+        flash.bytes[2 * SLOT_BYTES + bit / 8] ^= 1 << (bit % 8);
+        assert_eq!(everything_loaded(&flash), before_the_newest(2), "bit {bit}");
+        // Set again, all is well.
+        let mut store = Store::new(flash);
+        store.save(&numbered(4)).unwrap();
+        assert_eq!(store.load(), Ok(Some(newest(4))), "bit {bit}");
+    }
+}
+
+#[test]
+fn a_slot_begun_in_the_other_sector_is_noticed_as_well() {
+    // Eight slots fill the first sector; the ninth goes into the other.
+    let mut flash = saved(9);
+    flash.bytes[SECTOR + 40] ^= 1;
+    assert_eq!(everything_loaded(&flash), before_the_newest(8));
+}
+
+#[test]
+fn a_slot_of_another_schema_or_length_is_not_read_as_this() {
+    for change in [
+        |body: &mut [u8]| body[8] ^= 1,
+        // One byte more than the parameters take, and one less.
+        |body: &mut [u8]| body[12] += 1,
+        |body: &mut [u8]| body[12] -= 1,
+        // Beyond the slot.
+        |body: &mut [u8]| body[14] = 1,
+    ] {
+        let mut flash = saved(2);
+        forge(&mut flash, 1, change);
+        assert_eq!(everything_loaded(&flash), before_the_newest(1));
+    }
+}
+
 #[test]
 fn whole_slots_with_parameters_outside_their_ranges_are_not_taken() {
-    let mut store = Store::new(Flash::blank());
+    let mut store = Store::new(saved(2));
     let mut bad = numbered(3);
     bad.wheel.effective_radius_m = -1.0;
     store.save(&bad).unwrap();
-    assert_eq!(store.load(), Ok(None));
+    assert_eq!(store.load(), Ok(before_the_newest(2)));
 }

@@ -9,6 +9,9 @@ pub const SCHEMA_HASH: u32 = {
     fold(hash, include_bytes!("parameters.rs"))
 };
 
+/// The same over the parameters alone: what a controller stores with them, so that another layout is not read as this.
+pub const PARAMETERS_HASH: u32 = fold(0x811c_9dc5, include_bytes!("parameters.rs"));
+
 #[expect(
     clippy::indexing_slicing,
     reason = "evaluated at compile time only, where an index out of range stops the build"

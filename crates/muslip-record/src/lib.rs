@@ -50,14 +50,14 @@ mod parameters;
 mod wire;
 
 pub use frame::{BODY_BYTES, EncodeError, FRAME_BYTES, FrameError, FrameReader, encode};
-pub use hash::SCHEMA_HASH;
+pub use hash::{PARAMETERS_HASH, SCHEMA_HASH};
 pub use parameters::{
     BrakeParameters, EncoderParameters, EstimatorParameters, ForceParameters, LimitParameters,
     Parameters, SlipControlParameters, TyreRange, WheelParameters,
 };
 pub use wire::{
-    Answer, Command, Envelope, Estimate, Event, Fault, Hello, LinkCounters, Profile, Program,
-    QuarterCar, Refusal, STEPS, Sample, State, Status, Telemetry,
+    Answer, Command, Envelope, Estimate, Event, Fault, Hello, LinkCounters, Origin, Profile,
+    Program, QuarterCar, Refusal, STEPS, Sample, State, Status, Telemetry,
 };
 
 /// Version of the protocol: raised when the meaning of a field changes though its type does not.

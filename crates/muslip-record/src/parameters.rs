@@ -34,7 +34,7 @@ pub struct Parameters {
 pub struct WheelParameters {
     /// Free-rolling radius R in m, 0.005..=2.
     pub effective_radius_m: f32,
-    /// Moment of inertia J about the axle in kg m2, > 0.
+    /// Moment of inertia J about the axle in kg m2, 0.0001..=10,000.
     pub inertia_kg_m2: f32,
     /// Translating mass m in kg (a drum's inertia over its radius squared), > 0.
     pub vehicle_mass_kg: f32,
@@ -52,7 +52,8 @@ pub struct EncoderParameters {
 /// One channel of the bridge: force = (code - zero_code) newton_per_code.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct ForceParameters {
-    /// Scale in N for each code of the 24-bit converter; negative where the bridge is wired the other way.
+    /// Scale in N for each code of the 24-bit converter, of magnitude 1e-6..=0.1; negative where the bridge is wired
+    /// the other way.
     pub newton_per_code: f32,
     /// Code with no force; set by a tare.
     pub zero_code: i32,
@@ -65,22 +66,22 @@ pub struct BrakeParameters {
     pub duty_at_zero: f32,
     /// Duty at full pressure, above `duty_at_zero`, at most 1.
     pub duty_at_full: f32,
-    /// Brake torque at full pressure in N m, > 0.
+    /// Brake torque at full pressure in N m, > 0, at most 200,000.
     pub torque_at_full_nm: f32,
 }
 
-/// Limits of the interlocks.
+/// Limits of the interlocks. Each has a range of its own, so that no value switches its interlock off.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct LimitParameters {
-    /// Overspeed of the vehicle or drum in m/s, > 0.
+    /// Overspeed of the vehicle or drum in m/s, 1..=120.
     pub maximum_vehicle_speed_m_s: f32,
-    /// Overspeed of the wheel in rad/s, > 0.
+    /// Overspeed of the wheel in rad/s, 1..=2,000.
     pub maximum_wheel_speed_rad_s: f32,
-    /// Normal force in N below which it counts as lost while armed, > 0.
+    /// Normal force in N below which it counts as lost while armed, 10..=500,000.
     pub minimum_normal_force_n: f32,
-    /// Magnitude in N beyond which a force cannot be, > 0.
+    /// Magnitude in N beyond which a force cannot be, above the one before, at most 1,000,000.
     pub maximum_force_n: f32,
-    /// Supply of the valves in V below which it counts as browned out, > 0.
+    /// Supply of the valves in V below which it counts as browned out, 10..=36.
     pub minimum_supply_v: f32,
 }
 

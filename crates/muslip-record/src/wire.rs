@@ -23,7 +23,7 @@ pub enum Command {
     Hello,
     /// Nothing but a sign of life: due every 250 ms while armed.
     KeepAlive,
-    /// Idle or done to armed, if no interlock stands.
+    /// Idle or done to armed, if no interlock stands and the parameters are the rig's.
     Arm,
     /// Armed to a run.
     Start {
@@ -161,6 +161,8 @@ pub enum Refusal {
     Moving,
     /// The flash could not be written; the parameters are taken until the next reset.
     Storage,
+    /// The parameters in use are nobody's for this rig: see [`Origin`]. Set them first.
+    Unconfirmed,
 }
 
 /// Where a run is. The conditions of entry and exit are with the state machine.
@@ -320,6 +322,28 @@ pub struct LinkCounters {
     pub dropped: u32,
 }
 
+/// Where the parameters in use come from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Origin {
+    /// Built into the firmware: of no rig. Arming is refused.
+    BuiltIn,
+    /// The newest in flash.
+    Stored,
+    /// Those in flash before the newest, which are not whole. Arming is refused.
+    Previous,
+    /// Set since the reset, and lost with the next: they could not be stored.
+    Unstored,
+}
+
+impl Origin {
+    /// Whether somebody has set them for this rig, and they are the last that were set.
+    #[must_use]
+    pub const fn is_confirmed(self) -> bool {
+        matches!(self, Self::Stored | Self::Unstored)
+    }
+}
+
 /// Answer to [`Command::ReadStatus`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Status {
@@ -341,6 +365,6 @@ pub struct Status {
     pub worst_step_cycles: u32,
     /// Deepest stack so far in bytes.
     pub stack_used_bytes: u32,
-    /// True where the parameters in use are those in flash.
-    pub stored: bool,
+    /// Where the parameters in use come from.
+    pub parameters: Origin,
 }

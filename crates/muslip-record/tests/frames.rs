@@ -82,7 +82,7 @@ fn the_longest_messages_fit_a_frame() {
         worst_link_interrupt_cycles: all,
         worst_step_cycles: all,
         stack_used_bytes: all,
-        stored: true,
+        parameters: Origin::Previous,
     });
     let mut parameters = Parameters::default();
     parameters.drag.zero_code = i32::MIN;

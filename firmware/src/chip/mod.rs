@@ -19,7 +19,7 @@ mod outputs;
 
 use muslip_control::board::{Actuators, NotStored, RawSample, Sensors};
 use muslip_control::brake::BrakeOutput;
-use muslip_control::store::Store;
+use muslip_control::store::{Loaded, Store};
 use muslip_record::Parameters;
 use stm32f4::stm32f405::{ADC_COMMON, ADC1, GPIOB, IWDG, Peripherals, RCC};
 
@@ -58,7 +58,7 @@ pub struct Up {
     /// The rig's valves.
     pub actuators: ChipActuators,
     /// Parameters from flash.
-    pub parameters: Option<Parameters>,
+    pub loaded: Option<Loaded>,
     /// Whether the PLL runs.
     pub full_clock: bool,
     /// Whether the watchdog caused the reset.
@@ -80,7 +80,7 @@ pub fn start(_: &Peripherals) -> Up {
     start_supply(&p.RCC, &p.ADC_COMMON, &p.ADC1);
     let valves = Valves::new(outputs::start_pwm(&p.RCC, p.TIM1), DumpPin);
     let mut store = Store::new(ParameterFlash::new(p.FLASH));
-    let parameters = store.load().ok().flatten();
+    let loaded = store.load().ok().flatten();
     Up {
         sensors: ChipSensors {
             encoders: Encoders::start(&p.RCC, p.TIM3, p.TIM4, p.TIM5, p.TIM2),
@@ -93,7 +93,7 @@ pub fn start(_: &Peripherals) -> Up {
             store,
             watchdog: p.IWDG,
         },
-        parameters,
+        loaded,
         full_clock,
         watchdog_reset,
     }

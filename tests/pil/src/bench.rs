@@ -8,7 +8,7 @@ use muslip_control::board::RawSample;
 use muslip_control::brake::BrakeOutput;
 use muslip_control::emulation::{Delays, FromFirmware};
 use muslip_record::{
-    Answer, Command, Envelope, FrameReader, LINK_BYTES_PER_SECOND, Parameters, Profile,
+    Answer, Command, Envelope, FrameReader, LINK_BYTES_PER_SECOND, Parameters, Profile, Refusal,
     SAMPLE_RATE_HZ, State, Telemetry,
 };
 
@@ -105,7 +105,7 @@ impl Bench {
         else {
             bail!("at start-up: {first:?}");
         };
-        Ok(Self {
+        let mut bench = Self {
             qemu,
             native: Native::new()?,
             native_said: (FrameReader::new(), VecDeque::new()),
@@ -124,7 +124,19 @@ impl Bench {
             step_instructions: 0,
             room: WIRE_BYTES,
             burn: 0,
-        })
+        };
+        bench.set_parameters(Parameters::default())?;
+        Ok(bench)
+    }
+
+    /// Sets parameters, which the emulator cannot store.
+    ///
+    /// # Errors
+    /// As [`Bench::say`], or they are refused.
+    pub fn set_parameters(&mut self, parameters: Parameters) -> Result<()> {
+        let answer = self.say(Command::SetParameters { parameters })?;
+        ensure!(answer == Answer::Refused(Refusal::Storage), "{answer:?}");
+        Ok(())
     }
 
     /// One sample of everything.

@@ -8,7 +8,7 @@ use muslip_control::brake::BrakeOutput;
 use muslip_control::controller::{Controller, Identity};
 use muslip_control::emulation::Delays;
 use muslip_control::link::Transmit;
-use muslip_record::Parameters;
+use muslip_record::{Origin, Parameters};
 
 use crate::target::{Input, Output, Target};
 
@@ -59,7 +59,7 @@ impl Native {
             emulated: true,
             watchdog_reset: false,
             slow_clock: false,
-            stored: false,
+            parameters: Origin::BuiltIn,
         };
         let controller = Controller::new(&Parameters::default(), identity)
             .map_err(|error| anyhow!("default parameters: {error:?}"))?;

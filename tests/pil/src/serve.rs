@@ -8,20 +8,29 @@ use std::time::{Duration, Instant};
 use anyhow::Result;
 use muslip_control::brake::BrakeOutput;
 use muslip_control::interlock::SILENT_SAMPLES;
+use muslip_record::{Command, Envelope, FRAME_BYTES, Parameters, encode};
 
 use crate::bench::WIRE_BYTES;
 use crate::rig::Rig;
 use crate::target::{Input, Target};
 
-/// Lets a rig that is at speed from nothing run until the speed meters have settled.
+/// Sets the rig's parameters, and lets it run from nothing until the speed meters have settled.
 ///
 /// # Errors
 /// The target is gone.
 pub fn settle(target: &mut impl Target, rig: &mut Rig) -> Result<()> {
+    let set = Envelope {
+        sequence: 0,
+        body: Command::SetParameters {
+            parameters: Parameters::default(),
+        },
+    };
+    let mut buffer = [0; FRAME_BYTES];
+    let mut link = encode(&set, &mut buffer)?.chunks(usize::from(WIRE_BYTES));
     for _ in 0..100 {
         target.sample(&Input {
             raw: rig.sample(BrakeOutput::DUMPED),
-            link: &[],
+            link: link.next().unwrap_or_default(),
             room: WIRE_BYTES,
             burn: 0,
         })?;

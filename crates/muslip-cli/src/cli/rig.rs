@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 
 use clap::{Args, Subcommand};
 use muslip_record::{
-    Command, Event, Fault, Parameters, Profile, Program, STEPS, State, Status, Telemetry,
+    Command, Event, Fault, Origin, Parameters, Profile, Program, STEPS, State, Status, Telemetry,
 };
 use muslip_recordings::input_error::one_line;
 
@@ -230,10 +230,11 @@ fn print_status(status: &Status, terminal: &mut Terminal) -> Result<(), Failure>
         ("active interlocks", standing(status.standing)),
         (
             "parameters",
-            if status.stored {
-                "stored"
-            } else {
-                "not stored"
+            match status.parameters {
+                Origin::Stored => "stored",
+                Origin::Unstored => "set, but not stored",
+                Origin::Previous => "those before the last set, which are damaged: set them again",
+                Origin::BuiltIn => "none of this rig: set them",
             }
             .to_owned(),
         ),

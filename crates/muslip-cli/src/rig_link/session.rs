@@ -49,6 +49,10 @@ fn reason(refusal: &Refusal) -> String {
         Refusal::Interlock(fault) => format!("interlock {fault:?} is active"),
         Refusal::Profile => "a parameter of the profile is out of range".to_owned(),
         Refusal::Parameter(index) => format!("{} is out of range", field_name(*index)),
+        Refusal::Unconfirmed => {
+            "its parameters are not this rig's; set them with: muslip rig parameters --set"
+                .to_owned()
+        }
         Refusal::Moving => "it is moving".to_owned(),
         Refusal::Storage => {
             "the parameters apply until the next reset but could not be stored".to_owned()

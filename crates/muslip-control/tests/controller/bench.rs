@@ -7,8 +7,8 @@ use muslip_control::brake::BrakeOutput;
 use muslip_control::controller::{Controller, Identity};
 use muslip_control::link::Transmit;
 use muslip_record::{
-    Answer, Command, Envelope, FRAME_BYTES, FrameReader, Parameters, Profile, Program, State,
-    Status, Telemetry, encode,
+    Answer, Command, Envelope, FRAME_BYTES, FrameReader, Origin, Parameters, Profile, Program,
+    State, Status, Telemetry, encode,
 };
 
 /// An encoder that turns.
@@ -120,7 +120,7 @@ pub const IDENTITY: Identity = Identity {
     emulated: false,
     watchdog_reset: false,
     slow_clock: false,
-    stored: false,
+    parameters: Origin::Stored,
 };
 
 impl Bench {

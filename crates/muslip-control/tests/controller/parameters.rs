@@ -1,8 +1,9 @@
 //! Setting parameters, and zeros by a tare.
 
-use muslip_record::{Answer, Command, Event, Parameters, Refusal, State, Telemetry};
+use muslip_control::controller::Identity;
+use muslip_record::{Answer, Command, Event, Origin, Parameters, Refusal, State, Telemetry};
 
-use crate::bench::Bench;
+use crate::bench::{Bench, IDENTITY};
 
 #[test]
 fn parameters_are_taken_whole_or_not_at_all_and_only_at_rest() {
@@ -20,7 +21,7 @@ fn parameters_are_taken_whole_or_not_at_all_and_only_at_rest() {
     parameters.estimator.friction_std = 0.04;
     assert_eq!(set(&mut bench, parameters), Answer::Done);
     assert_eq!(bench.flash.stored, Some(parameters));
-    assert!(bench.status().stored);
+    assert_eq!(bench.status().parameters, Origin::Stored);
     bench.flash.broken = true;
     parameters.estimator.friction_std = 0.05;
     assert_eq!(
@@ -28,11 +29,40 @@ fn parameters_are_taken_whole_or_not_at_all_and_only_at_rest() {
         Answer::Refused(Refusal::Storage)
     );
     assert_eq!(*bench.controller.parameters(), parameters);
-    assert!(!bench.status().stored);
+    assert_eq!(bench.status().parameters, Origin::Unstored);
     let mut bench = Bench::braking();
     let refused = set(&mut bench, parameters);
     assert_eq!(refused, Answer::Refused(Refusal::WrongState(State::Ramp)));
     assert_eq!(*bench.controller.parameters(), Parameters::default());
+}
+
+#[test]
+fn parameters_that_nobody_set_can_neither_be_armed_nor_tared_until_somebody_does() {
+    for origin in [Origin::BuiltIn, Origin::Previous] {
+        for broken in [false, true] {
+            let mut bench = Bench::with(Identity {
+                parameters: origin,
+                ..IDENTITY
+            });
+            bench.flash.broken = broken;
+            bench.run(50);
+            let refused = Answer::Refused(Refusal::Unconfirmed);
+            assert_eq!(bench.say(Command::Arm), refused);
+            assert_eq!(bench.say(Command::Tare), refused);
+            assert_eq!(bench.status().parameters, origin);
+            let set = Command::SetParameters {
+                parameters: Parameters::default(),
+            };
+            let answer = bench.say(set);
+            if broken {
+                assert_eq!(answer, Answer::Refused(Refusal::Storage));
+            } else {
+                assert_eq!(answer, Answer::Done);
+            }
+            bench.run(50);
+            assert_eq!(bench.say(Command::Arm), Answer::Done);
+        }
+    }
 }
 
 #[test]

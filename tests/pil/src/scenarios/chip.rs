@@ -22,7 +22,7 @@ pub fn log(image: &Path) -> Result<Found> {
     bench.run(10)?;
     let lines = log::decode(&std::fs::read(image)?, &bench.qemu.log()?)?;
     let wanted = [
-        "muslip: emulated true, core 168000000 Hz, watchdog reset false, parameters stored false",
+        "muslip: emulated true, core 168000000 Hz, watchdog reset false, parameters BuiltIn",
         "Idle -> Armed, fault None",
         "Armed -> SpinUp, fault None",
         "SpinUp -> Ramp, fault None",

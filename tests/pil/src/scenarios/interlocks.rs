@@ -7,7 +7,7 @@ use muslip_control::EDGE_TIMER_HZ;
 use muslip_control::board::BridgeQuality;
 use muslip_control::brake::BrakeOutput;
 use muslip_control::interlock::{LOCK_TIME_S, SILENT_SAMPLES};
-use muslip_record::{Answer, Command, Fault, Parameters, Profile, Program, Refusal, State};
+use muslip_record::{Command, Fault, Parameters, Profile, Program, State};
 
 use super::{CYCLES_PER_SAMPLE, Found, LAW, RAMP};
 use crate::bench::{Bench, Worst};
@@ -122,10 +122,7 @@ fn set_filter_that_fails(bench: &mut Bench) -> Result<()> {
     let mut parameters = Parameters::default();
     parameters.estimator.friction_std = 1e-30;
     bench.run(50)?;
-    let answer = bench.say(Command::SetParameters { parameters })?;
-    // In use, though there is nowhere to store them.
-    ensure!(answer == Answer::Refused(Refusal::Storage), "{answer:?}");
-    Ok(())
+    bench.set_parameters(parameters)
 }
 
 /// Every fault dumps the brake on the sample on which its condition holds, and latches.

@@ -1,0 +1,127 @@
+//! What no parameter may be set beyond, because an interlock would then never fire.
+//!
+//! Parameters come over the link. Those that an interlock compares with have a range here, at compile time; a value
+//! outside it is refused like any other that is out of range. docs/rig.md prints [`CEILINGS`].
+
+/// The range of one parameter that an interlock uses.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Ceiling {
+    /// The parameter, as in a parameters file.
+    pub parameter: &'static str,
+    /// Smallest value that is taken.
+    pub lowest: f32,
+    /// Largest value that is taken.
+    pub highest: f32,
+    /// Their unit.
+    pub unit: &'static str,
+    /// What would fail to fire beyond it.
+    pub interlock: &'static str,
+}
+
+impl Ceiling {
+    /// Whether a value is in the range; NaN is not.
+    #[must_use]
+    pub fn allows(&self, value: f32) -> bool {
+        value >= self.lowest && value <= self.highest
+    }
+}
+
+const fn ceiling(
+    parameter: &'static str,
+    (lowest, highest): (f32, f32),
+    unit: &'static str,
+    interlock: &'static str,
+) -> Ceiling {
+    assert!(lowest > 0.0 && highest > lowest && highest < f32::INFINITY);
+    Ceiling {
+        parameter,
+        lowest,
+        highest,
+        unit,
+        interlock,
+    }
+}
+
+const WHEEL_SENSOR: &str = "WheelSensorLost, WheelSensorOutOfRange";
+
+/// Free-rolling radius.
+pub const EFFECTIVE_RADIUS_M: Ceiling =
+    ceiling("wheel.effective_radius_m", (0.005, 2.0), "m", "WheelLocked");
+/// Moment of inertia.
+pub const INERTIA_KG_M2: Ceiling =
+    ceiling("wheel.inertia_kg_m2", (1e-4, 1e4), "kg m²", WHEEL_SENSOR);
+/// Radius of the vehicle's encoder.
+pub const VEHICLE_ENCODER_RADIUS_M: Ceiling = ceiling(
+    "vehicle_encoder_radius_m",
+    (0.005, 10.0),
+    "m",
+    "Overspeed, WheelLocked",
+);
+/// Magnitude of a bridge's scale.
+pub const NEWTON_PER_CODE: Ceiling = ceiling(
+    "drag.newton_per_code, normal.newton_per_code",
+    (1e-6, 0.1),
+    "N, magnitude",
+    "BridgeOutOfRange",
+);
+/// Torque of the brake.
+pub const TORQUE_AT_FULL_NM: Ceiling = ceiling(
+    "brake.torque_at_full_nm",
+    (0.1, 200_000.0),
+    "N m",
+    WHEEL_SENSOR,
+);
+/// Overspeed of the vehicle.
+pub const MAXIMUM_VEHICLE_SPEED_M_S: Ceiling = ceiling(
+    "limits.maximum_vehicle_speed_m_s",
+    (1.0, 120.0),
+    "m/s",
+    "Overspeed",
+);
+/// Overspeed of the wheel.
+pub const MAXIMUM_WHEEL_SPEED_RAD_S: Ceiling = ceiling(
+    "limits.maximum_wheel_speed_rad_s",
+    (1.0, 2_000.0),
+    "rad/s",
+    "Overspeed",
+);
+/// Normal force that counts as lost.
+pub const MINIMUM_NORMAL_FORCE_N: Ceiling = ceiling(
+    "limits.minimum_normal_force_n",
+    (10.0, 500_000.0),
+    "N",
+    "NormalForceLost",
+);
+/// Force that cannot be.
+pub const MAXIMUM_FORCE_N: Ceiling = ceiling(
+    "limits.maximum_force_n",
+    (10.0, 1_000_000.0),
+    "N",
+    "BridgeOutOfRange",
+);
+/// Supply of the valves.
+pub const MINIMUM_SUPPLY_V: Ceiling =
+    ceiling("limits.minimum_supply_v", (10.0, 36.0), "V", "BrownOut");
+/// Change of the wheel's speed that brake and tyre can make, from torque, force limit, radius and inertia together: with
+/// a larger one a lost sensor would pass for a wheel that stops within two samples.
+pub const WHEEL_CHANGE_RAD_S2: Ceiling = ceiling(
+    "1.5 (torque_at_full_nm + maximum_force_n effective_radius_m) / inertia_kg_m2",
+    (1.0, 100_000.0),
+    "rad/s²",
+    WHEEL_SENSOR,
+);
+
+/// All of them.
+pub const CEILINGS: [Ceiling; 11] = [
+    EFFECTIVE_RADIUS_M,
+    INERTIA_KG_M2,
+    VEHICLE_ENCODER_RADIUS_M,
+    NEWTON_PER_CODE,
+    TORQUE_AT_FULL_NM,
+    MAXIMUM_VEHICLE_SPEED_M_S,
+    MAXIMUM_WHEEL_SPEED_RAD_S,
+    MINIMUM_NORMAL_FORCE_N,
+    MAXIMUM_FORCE_N,
+    MINIMUM_SUPPLY_V,
+    WHEEL_CHANGE_RAD_S2,
+];
