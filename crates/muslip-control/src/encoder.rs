@@ -10,6 +10,10 @@
 //! Trans. Industrial Electronics 36 (1989); T. Ohmae et al., ibid. 29 (1982)). Between pulses the speed cannot
 //! be more than one pulse over the time that has passed, which bounds it from above; with no pulse
 //! for [`STANDSTILL_S`] it is zero.
+//!
+//! A pulse counts where it moves the wheel on: the first one after a change of direction only takes back the last. A
+//! wheel that rocks on an edge counts up and down and captures an edge each time without turning; neither its count
+//! nor its captures are motion, and the time since the last pulse that counted goes on.
 
 use crate::EDGE_TIMER_HZ;
 use crate::board::EncoderReading;
@@ -44,7 +48,12 @@ pub fn rising_edges(count: u16, counts_down: bool) -> u16 {
 pub struct SpeedMeter {
     radians_per_pulse: f32,
     reversed: bool,
-    last: Option<(u16, u32)>,
+    /// Edges counted at the last sample.
+    last_edges: Option<u16>,
+    /// Time of the last pulse that counted.
+    pulse_ticks: u32,
+    /// Direction of the last pulse, counted or not.
+    forward: bool,
     /// No pulse for [`STANDSTILL_S`], or none yet: the time of the last one means nothing.
     stands: bool,
     /// At the last pulse.
@@ -72,7 +81,9 @@ impl SpeedMeter {
             radians_per_pulse: core::f32::consts::TAU
                 / f32::from(encoder.pulses_per_revolution.max(1)),
             reversed: encoder.reversed,
-            last: None,
+            last_edges: None,
+            pulse_ticks: 0,
+            forward: true,
             stands: true,
             measured_rad_s: 0.0,
             speed_rad_s: 0.0,
@@ -81,12 +92,21 @@ impl SpeedMeter {
 
     /// Takes the reading of the next sample.
     pub fn update(&mut self, reading: &EncoderReading) -> Speed {
-        let (edges, ticks) = self.last.unwrap_or((reading.edges, reading.edge_ticks));
+        let edges = self.last_edges.replace(reading.edges);
         // Wraps rightly as long as fewer than 16,384 pulses come in a sample.
-        let pulses = reading.edges.wrapping_sub(edges).cast_signed() / 2;
+        let moved = reading
+            .edges
+            .wrapping_sub(edges.unwrap_or(reading.edges))
+            .cast_signed()
+            / 2;
+        let pulses = self.counted(moved);
         let pulsed = pulses != 0;
+        if edges.is_none() {
+            self.pulse_ticks = reading.edge_ticks;
+        }
         if pulsed {
-            let period = reading.edge_ticks.wrapping_sub(ticks);
+            let period = reading.edge_ticks.wrapping_sub(self.pulse_ticks);
+            self.pulse_ticks = reading.edge_ticks;
             if self.stands {
                 // The first pulse after a standstill has no period.
                 self.stands = false;
@@ -101,8 +121,9 @@ impl SpeedMeter {
             }
             self.speed_rad_s = self.measured_rad_s;
         }
-        self.last = Some((reading.edges, reading.edge_ticks));
-        if !pulsed && reading.age_ticks >= STANDSTILL_TICKS {
+        let now_ticks = reading.edge_ticks.wrapping_add(reading.age_ticks);
+        let age_ticks = now_ticks.wrapping_sub(self.pulse_ticks);
+        if !pulsed && age_ticks >= STANDSTILL_TICKS {
             self.stands = true;
         }
         if self.stands {
@@ -115,7 +136,7 @@ impl SpeedMeter {
                 pulsed,
             };
         }
-        let age_s = nearest(reading.age_ticks) * TICK_S;
+        let age_s = nearest(age_ticks) * TICK_S;
         if !pulsed {
             let bound = self.radians_per_pulse / age_s.max(TICK_S);
             // Not `clamp`, which panics where the bounds are not in order.
@@ -127,6 +148,18 @@ impl SpeedMeter {
             age_s,
             pulsed,
         }
+    }
+}
+
+impl SpeedMeter {
+    /// Pulses that move the wheel on: all but the first after a change of direction.
+    fn counted(&mut self, pulses: i16) -> i16 {
+        let turned = pulses != 0 && (pulses > 0) != self.forward;
+        if !turned {
+            return pulses;
+        }
+        self.forward = pulses > 0;
+        pulses - pulses.signum()
     }
 }
 
@@ -257,5 +290,166 @@ mod tests {
         // Backward from high 3: fall 2, rise 1, fall 0.
         assert_eq!([3, 2, 1, 0].map(|c| rising_edges(c, true)), [3, 3, 1, 1]);
         assert_eq!(rising_edges(0, false), u16::MAX);
+    }
+
+    /// Both channels of an encoder at the edges' instants, with the timers as they are set up: one counts A's edges by
+    /// B's level, one captures A's rise.
+    struct Timers {
+        duty: f64,
+        high: bool,
+        count: u16,
+        down: bool,
+        edge_ticks: u32,
+        now_s: f64,
+    }
+
+    /// Steps of a sample: finer than any edge here.
+    const STEPS: u32 = 200;
+
+    impl Timers {
+        fn new(duty: f64, pulses: f64) -> Self {
+            let high = pulses.rem_euclid(1.0) < duty;
+            Self {
+                duty,
+                high,
+                count: u16::from(high),
+                down: false,
+                edge_ticks: 0,
+                now_s: 0.0,
+            }
+        }
+
+        /// A sample over which the position in pulses is this function of the time in s.
+        fn sample(&mut self, position: impl Fn(f64) -> f64) -> EncoderReading {
+            let ticks = |s: f64| (s * f64::from(EDGE_TIMER_HZ)).round() as u64 as u32;
+            for _ in 0..STEPS {
+                self.now_s += f64::from(SAMPLE_S) / f64::from(STEPS);
+                let pulses = position(self.now_s);
+                let high = pulses.rem_euclid(1.0) < self.duty;
+                let b = (pulses - 0.25).rem_euclid(1.0) < 0.5;
+                if high != self.high {
+                    // RM0090, table 96: a rise with the other channel low counts up, with it high down.
+                    self.down = high == b;
+                    self.count = if self.down {
+                        self.count.wrapping_sub(1)
+                    } else {
+                        self.count.wrapping_add(1)
+                    };
+                    if high {
+                        self.edge_ticks = ticks(self.now_s);
+                    }
+                    self.high = high;
+                }
+            }
+            EncoderReading {
+                edges: rising_edges(self.count, self.down),
+                edge_ticks: self.edge_ticks,
+                age_ticks: ticks(self.now_s).wrapping_sub(self.edge_ticks),
+            }
+        }
+    }
+
+    const RINGS: [u16; 4] = [12, 24, 48, 500];
+    const DUTIES: [f64; 3] = [0.3, 0.5, 0.7];
+
+    fn meter(pulses_per_revolution: u16) -> SpeedMeter {
+        SpeedMeter::new(&EncoderParameters {
+            pulses_per_revolution,
+            reversed: false,
+        })
+    }
+
+    #[test]
+    fn a_wheel_that_rocks_on_an_edge_stands_at_every_phase() {
+        for ring in RINGS {
+            for duty in DUTIES {
+                for phase in 0..20 {
+                    // Rolls at 60 rad/s, then stops at this phase and shakes by this many pulses at this rate.
+                    for (shake, hertz) in [(0.1, 330.0), (0.4, 90.0), (0.9, 35.0)] {
+                        let rate = 60.0 / core::f64::consts::TAU * f64::from(ring);
+                        let stop = (rate * 0.2).floor() + f64::from(phase) / 20.0;
+                        let position = |s: f64| {
+                            let rolled = (rate * s).min(stop);
+                            let shakes = rate * s > stop;
+                            let angle = core::f64::consts::TAU * hertz * s;
+                            rolled + f64::from(u8::from(shakes)) * 0.5 * shake * angle.sin()
+                        };
+                        let (mut timers, mut meter) = (Timers::new(duty, 0.0), meter(ring));
+                        for sample in 0..600 {
+                            let speed = meter.update(&timers.sample(position));
+                            // 0.2 s of rolling, a pulse for the last edges, then the standstill's time.
+                            if sample > 200 + 250 + 12 {
+                                assert_eq!(
+                                    speed.rad_s, 0.0,
+                                    "{ring} pulses, duty {duty}, phase {phase}, shake {shake}, {sample}"
+                                );
+                                assert!(speed.age_s >= STANDSTILL_S);
+                            }
+                        }
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn the_duty_of_channel_a_does_not_show_in_the_speed_either_way() {
+        for ring in RINGS {
+            for duty in DUTIES {
+                for rad_s in [35.0, -35.0] {
+                    let rate = rad_s / core::f64::consts::TAU * f64::from(ring);
+                    let (mut timers, mut meter) = (Timers::new(duty, 0.1), meter(ring));
+                    for sample in 0..400 {
+                        let speed = meter.update(&timers.sample(|s| 0.1 + rate * s));
+                        let error = f64::from(speed.rad_s) / rad_s - 1.0;
+                        // The simulation's steps are 5 us.
+                        let share = 5e-6 * rate.abs() + 1e-4;
+                        assert!(sample < 60 || error.abs() < share, "{ring} {duty} {error}");
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_reversal_is_followed_and_never_read_as_faster_than_it_is() {
+        for ring in RINGS {
+            for duty in DUTIES {
+                for phase in 0..20 {
+                    let rate = 20.0 / core::f64::consts::TAU * f64::from(ring);
+                    let turn = 0.3 + f64::from(phase) / 20.0 / rate;
+                    let position = |s: f64| rate * (s.min(turn) - (s - turn).max(0.0));
+                    let (mut timers, mut meter) = (Timers::new(duty, 0.0), meter(ring));
+                    let mut speed = 0.0;
+                    for _ in 0..600 {
+                        speed = meter.update(&timers.sample(position)).rad_s;
+                        assert!(speed.abs() < 20.4, "{ring} {duty} {phase}: {speed}");
+                    }
+                    assert!((speed + 20.0).abs() < 0.4, "{ring} {duty} {phase}: {speed}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_lost_channel_b_reads_as_no_pulses() {
+        // Counts forth and back on each pulse of A, whose captures go on.
+        let mut meter = meter(500);
+        let mut speed = 0.0;
+        for sample in 0..600_u32 {
+            let ticks = sample * (EDGE_TIMER_HZ / 1000);
+            let lost = sample >= 200;
+            speed = meter
+                .update(&EncoderReading {
+                    edges: if lost { 1_601 } else { (8 * sample + 1) as u16 },
+                    edge_ticks: ticks,
+                    age_ticks: 100,
+                })
+                .rad_s;
+            if sample == 190 {
+                assert!(speed > 40.0, "{speed}");
+            }
+        }
+        assert_eq!(speed, 0.0);
     }
 }

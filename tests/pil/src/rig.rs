@@ -31,7 +31,9 @@ pub struct Trouble {
     pub vehicle_lost: bool,
     /// The wheel's encoder counts this many pulses too many in each sample.
     pub extra_wheel_pulses: u16,
-    /// The same of the vehicle's.
+    /// The wheel's encoder stands on an edge and shakes: captures come, and nothing is counted.
+    pub wheel_rocks: bool,
+    /// Too many pulses of the vehicle's encoder in each sample.
     pub extra_vehicle_pulses: u16,
     /// The bridge converter's answers are bad or old.
     pub bridge: BridgeQuality,
@@ -72,7 +74,9 @@ struct Encoder {
     /// Pulses counted, of the one before as well.
     pulses: f64,
     counted: f64,
+    /// When the last pulse came, and when the last edge was captured: the same, unless the encoder shakes.
     edge_s: f64,
+    capture_s: f64,
 }
 
 impl Encoder {
@@ -82,6 +86,7 @@ impl Encoder {
             pulses: 0.25,
             counted: 0.0,
             edge_s: 0.0,
+            capture_s: 0.0,
         }
     }
 
@@ -91,6 +96,7 @@ impl Encoder {
         let whole = end.floor();
         if !lost && whole > self.pulses.floor() {
             self.edge_s = now_s - step_s * (end - whole) / (end - self.pulses);
+            self.capture_s = self.edge_s;
             self.counted += whole - self.pulses.floor();
         }
         self.pulses = end;
@@ -100,8 +106,8 @@ impl Encoder {
         let ticks = |s: f64| (s * f64::from(EDGE_TIMER_HZ)) as u64;
         EncoderReading {
             edges: (self.counted as u64 * 2 + 1) as u16,
-            edge_ticks: ticks(self.edge_s) as u32,
-            age_ticks: (ticks(now_s) - ticks(self.edge_s)) as u32,
+            edge_ticks: ticks(self.capture_s) as u32,
+            age_ticks: (ticks(now_s) - ticks(self.capture_s)) as u32,
         }
     }
 }
@@ -144,6 +150,11 @@ impl Rig {
         })
     }
 
+    /// Time since the wheel's encoder last gave a pulse that turned it, in s.
+    pub fn wheel_pulse_age_s(&self) -> f64 {
+        self.samples as f64 * SAMPLE_S - self.wheel.edge_s
+    }
+
     /// True slip now.
     pub fn slip_ratio(&self) -> f64 {
         self.plant.contact(self.normal_force_n).slip_ratio
@@ -179,6 +190,9 @@ impl Rig {
                 .turn(self.vehicle_rad, now_s, step_s, trouble.vehicle_lost);
         }
         self.samples += 1;
+        if trouble.wheel_rocks {
+            self.wheel.capture_s = self.samples as f64 * SAMPLE_S - 1e-4;
+        }
         self.wheel.counted += f64::from(trouble.extra_wheel_pulses);
         self.vehicle.counted += f64::from(trouble.extra_vehicle_pulses);
         self.read(normal_force_n)

@@ -47,6 +47,8 @@ pub struct Rig {
     pub quality: BridgeQuality,
     pub frozen: bool,
     pub late: bool,
+    /// The wheel rocks on an edge: captures come and nothing is counted.
+    pub wheel_rocks: bool,
 }
 
 impl Rig {
@@ -61,6 +63,7 @@ impl Rig {
             quality: BridgeQuality::Fresh,
             frozen: false,
             late: false,
+            wheel_rocks: false,
         }
     }
 }
@@ -148,6 +151,9 @@ impl Bench {
     pub fn raw(&mut self) -> RawSample {
         let now_s = self.samples as f64 * 1e-3;
         let code = |force: f64, noise: u64| (force / 0.002) as i32 + (noise % 7) as i32;
+        if self.rig.wheel_rocks {
+            self.wheel.edge_s = now_s - 1e-4;
+        }
         let raw = RawSample {
             wheel: self.wheel.turn(now_s, self.rig.wheel_rad_s, 500.0),
             vehicle: self.vehicle.turn(now_s, self.rig.vehicle_m_s, 1000.0),

@@ -145,6 +145,27 @@ fn a_wheel_that_locks_is_released_after_two_tenths_of_a_second() {
 }
 
 #[test]
+fn a_locked_wheel_that_rocks_on_an_edge_is_released_as_well() {
+    let mut bench = Bench::new();
+    bench.start(Profile {
+        skid_slip: 1.0,
+        ..RAMP
+    });
+    bench.run(400);
+    for sample in 0..1000 {
+        bench.rig.wheel_rad_s = (bench.rig.wheel_rad_s - 1.0).max(0.0);
+        bench.rig.wheel_rocks = bench.rig.wheel_rad_s == 0.0;
+        bench.run(1);
+        if bench.state() == State::Fault {
+            assert_eq!(bench.controller.fault(), Some(Fault::WheelLocked));
+            assert!((240..=266).contains(&sample), "{sample}");
+            return;
+        }
+    }
+    panic!("the wheel stayed locked: {:?}", bench.state());
+}
+
+#[test]
 fn an_estimator_that_refuses_its_own_state_is_a_fault() {
     let mut bench = Bench::new();
     let mut parameters = Parameters::default();

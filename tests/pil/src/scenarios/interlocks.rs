@@ -3,7 +3,6 @@
 use std::path::Path;
 
 use anyhow::{Result, ensure};
-use muslip_control::EDGE_TIMER_HZ;
 use muslip_control::board::BridgeQuality;
 use muslip_control::brake::BrakeOutput;
 use muslip_control::interlock::{LOCK_TIME_S, SILENT_SAMPLES};
@@ -19,7 +18,7 @@ struct Injection {
     inject: fn(&mut Bench),
     /// Whether its condition, as the interlock states it, held at the last sample; judged from what the simulator
     /// gave, not from what the image said.
-    holds: fn(&Bench) -> bool,
+    holds: fn(&mut Bench) -> bool,
     /// Samples from the first on which it held to the one that dumped the brake, both counted.
     samples: u32,
 }
@@ -95,9 +94,17 @@ fn injections() -> Vec<Injection> {
         },
         // A brake that grabs: the wheel needs some 40 ms to stop and may then stand for 200.
         Injection {
+            holds: |b| b.rig.wheel_pulse_age_s() > f64::from(LOCK_TIME_S),
+            ..at_once(Fault::WheelLocked, |b| {
+                trouble(b, |t| t.stuck_brake_nm = Some(2_500.0))
+            })
+        },
+        // The same with an encoder that stands on an edge and shakes.
+        Injection {
             holds: |b| {
-                let age_s = f64::from(b.raw.wheel.age_ticks) / f64::from(EDGE_TIMER_HZ);
-                age_s > f64::from(LOCK_TIME_S)
+                let locked = b.rig.slip_ratio() >= 1.0;
+                trouble(b, |t| t.wheel_rocks = locked);
+                b.rig.wheel_pulse_age_s() > f64::from(LOCK_TIME_S)
             },
             ..at_once(Fault::WheelLocked, |b| {
                 trouble(b, |t| t.stuck_brake_nm = Some(2_500.0))
@@ -153,7 +160,7 @@ pub fn interlocks(image: &Path) -> Result<Found> {
             bench.sample()?;
             bench.burn = 0;
             all += 1;
-            held += u32::from(held > 0 || (injection.holds)(&bench));
+            held += u32::from((injection.holds)(&mut bench) || held > 0);
             ensure!(all < 500, "{fault:?}: the brake is not dumped");
         }
         ensure!(bench.brake == BrakeOutput::DUMPED);
