@@ -154,6 +154,7 @@ pub fn start() -> Started {
             emulated,
             watchdog_reset: false,
             slow_clock: false,
+            set_up: true,
             parameters: Origin::BuiltIn,
         };
         (board, identity, Parameters::default())
@@ -168,6 +169,7 @@ pub fn start() -> Started {
             emulated,
             watchdog_reset: up.watchdog_reset,
             slow_clock: !up.full_clock,
+            set_up: up.set_up,
             parameters: match up.loaded {
                 Some(Loaded { newest: true, .. }) => Origin::Stored,
                 Some(_) => Origin::Previous,
@@ -223,8 +225,10 @@ pub fn start_sampling() {
     }
     if is_emulated() {
         let sampling_instructions = chip::sampling_instructions();
+        let registers_hold = chip::registers_hold();
         emulator::say(&FromFirmware::Ready {
             sampling_instructions,
+            registers_hold,
             priorities: [
                 NVIC::get_priority(Interrupt::USART2) >> 4,
                 SCB::get_priority(SystemHandler::SysTick) >> 4,

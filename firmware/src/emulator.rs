@@ -253,6 +253,8 @@ fn obey(message: &ToFirmware) {
             timer.enable_counter();
         }
         ToFirmware::HardFault => cortex_m::asm::udf(),
+        // SAFETY: NMIPENDSET (ARMv7-M, B3.2.4); zeros change nothing.
+        ToFirmware::NonMaskable => unsafe { (*SCB::PTR).icsr.write(1 << 31) },
     }
 }
 

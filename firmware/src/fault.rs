@@ -22,6 +22,15 @@ unsafe fn HardFault(_: &ExceptionFrame) -> ! {
     end(false)
 }
 
+/// The crystal has stopped: the core runs on from its internal oscillator, at a tenth of its clock (7.2.7).
+// SAFETY: never returns to what it interrupted.
+#[allow(unsafe_code, reason = "the handler is unsafe by its type")]
+#[exception]
+unsafe fn NonMaskableInt() -> ! {
+    dump();
+    end(false)
+}
+
 /// Nothing more happens: the watchdog resets the chip, which starts up faulted.
 fn end(panic: bool) -> ! {
     cortex_m::interrupt::disable();

@@ -14,6 +14,10 @@ pub const APB2_HZ: u32 = 84_000_000;
 pub const LOG_BAUD: u32 = 921_600;
 /// Frequency of the proportional valve's PWM in Hz.
 pub const VALVE_PWM_HZ: u32 = 2_000;
+/// TIM1's clock divided by this keeps a period of that PWM within 16 bits.
+pub const VALVE_PWM_PRESCALER: u32 = 4;
+/// Steps of a period of that PWM.
+pub const VALVE_PWM_PERIOD: u32 = CORE_HZ / VALVE_PWM_PRESCALER / VALVE_PWM_HZ;
 /// Supply of the valves in mV that makes the converter's full scale: 3.3 V behind a divider of 10:1.
 pub const SUPPLY_FULL_SCALE_MV: u32 = 36_300;
 /// Core cycles from one sample to the next.

@@ -139,6 +139,8 @@ pub fn start(rcc: &RCC, log: &USART1, link: USART2, full_clock: bool) -> Option<
     // SAFETY: USART1EN (7.3.14).
     rcc.apb2enr()
         .modify(|r, w| unsafe { w.bits(r.bits() | 1 << 4) });
+    // The write right after an enable can be lost (ES0182, 2.1.13), one after a look at it cannot.
+    rcc.apb2enr().read();
     // SAFETY: mantissa and fraction (30.6.3).
     log.brr()
         .write(|w| unsafe { w.bits(baud_divisor(log_hz, LOG_BAUD)) });

@@ -31,6 +31,8 @@ pub struct Identity {
     pub watchdog_reset: bool,
     /// The core runs slower than it should.
     pub slow_clock: bool,
+    /// Every register holds what start-up wrote to it.
+    pub set_up: bool,
     /// Where the parameters come from.
     pub parameters: Origin,
 }
@@ -154,6 +156,7 @@ impl Controller {
             overran: core::mem::take(&mut self.overran),
             watchdog_reset: self.watchdog_reset,
             slow_clock: self.identity.slow_clock,
+            set_up_failed: !self.identity.set_up,
             timed_out: self.sequence.timed_out(),
         };
         self.standing = self.interlocks.check(raw, &converted, &circumstances);

@@ -33,6 +33,8 @@ pub enum ToFirmware {
     },
     /// Execute an undefined instruction, as memory gone bad would.
     HardFault,
+    /// Raise the interrupt that cannot be masked, as the crystal's end would.
+    NonMaskable,
 }
 
 /// What can hold an interrupt off, the most of each so far, in instructions.
@@ -55,6 +57,9 @@ pub enum FromFirmware {
     Ready {
         /// Instructions of one look at the chip's own sensors, with every bus ready at once.
         sampling_instructions: u32,
+        /// Whether the chip's registers hold what start-up sets: not in the emulator, which has not run that start-up
+        /// and has few of them.
+        registers_hold: bool,
         /// Priorities of the link's interrupt and of sampling as they are set; 0 goes first.
         priorities: [u8; 2],
     },

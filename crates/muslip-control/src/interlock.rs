@@ -22,6 +22,7 @@
 //! | `Watchdog` | the independent watchdog caused the last reset; until cleared |
 //! | `Clock` | the core does not run at its full clock; for good |
 //! | `Timeout` | a state lasted longer than it may, see [`sequence`](crate::sequence) |
+//! | `SetUp` | a register of the chip does not hold what start-up wrote to it; for good |
 
 use muslip_record::{Fault, Parameters};
 
@@ -95,6 +96,8 @@ pub struct Circumstances {
     pub watchdog_reset: bool,
     /// The core does not run at its full clock.
     pub slow_clock: bool,
+    /// A register does not hold what start-up wrote to it.
+    pub set_up_failed: bool,
     /// A state lasted too long.
     pub timed_out: bool,
 }
@@ -153,6 +156,7 @@ impl Interlocks {
         faults.add_if(circumstances.watchdog_reset, Fault::Watchdog);
         faults.add_if(circumstances.slow_clock, Fault::Clock);
         faults.add_if(circumstances.timed_out, Fault::Timeout);
+        faults.add_if(circumstances.set_up_failed, Fault::SetUp);
         faults
     }
 

@@ -4,7 +4,7 @@ use crate::Fault;
 
 impl Fault {
     /// In the order of their numbers, which is the order in which they are named.
-    pub const ALL: [Self; 18] = [
+    pub const ALL: [Self; 19] = [
         Self::EmergencyStop,
         Self::WheelLocked,
         Self::Overspeed,
@@ -23,5 +23,6 @@ impl Fault {
         Self::Watchdog,
         Self::Clock,
         Self::Timeout,
+        Self::SetUp,
     ];
 }

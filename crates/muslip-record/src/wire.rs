@@ -230,6 +230,8 @@ pub enum Fault {
     Clock,
     /// The wheel did not roll freely again after a release, or the speed was never reached.
     Timeout,
+    /// A register of the controller's chip does not hold what start-up wrote to it; the log names it.
+    SetUp,
 }
 
 /// Something that happened.

@@ -3,8 +3,10 @@
 use embedded_hal::spi::{ErrorKind, ErrorType, Operation, SpiDevice};
 use muslip_control::ads131m02::{Ads131m02, ChannelConfig};
 use muslip_control::board::{BridgeQuality, BridgeReading};
-use stm32f4::stm32f405::{GPIOB, RCC, SPI2};
+use stm32f4::stm32f405::{GPIOB, SPI2};
 
+use super::bus;
+use crate::registers::{self, set_up};
 use crate::settings::wait_for;
 
 /// A byte takes 130 core cycles; far more than this many reads is a dead bus.
@@ -19,14 +21,9 @@ pub struct Bridge {
 }
 
 impl Bridge {
-    /// SPI2 in mode 1 at 10.5 MHz (28.5.1: CPHA, master, software select, APB1 by 4), then the converter.
-    pub fn start(rcc: &RCC, spi: SPI2) -> Self {
-        rcc.apb1enr()
-            .modify(|r, w| unsafe { w.bits(r.bits() | 1 << 14) });
-        let (phase, master, divide_by_4, on) = (1, 1 << 2, 0b001 << 3, 1 << 6);
-        let software_select = 1 << 8 | 1 << 9;
-        spi.cr1()
-            .write(|w| unsafe { w.bits(phase | master | divide_by_4 | on | software_select) });
+    /// SPI2, then the converter.
+    pub fn start(spi: SPI2) -> Self {
+        set_up(&registers::BRIDGE, &mut bus::Bus);
         let mut converter = Ads131m02::new(Bus(spi));
         let configured = converter.configure([ChannelConfig::default(); 2]).is_ok();
         Self {

@@ -30,6 +30,8 @@ pub fn start(rcc: &RCC, flash: &FLASH) -> bool {
         // Bit 22: from the crystal. Bit 29 is reserved and 1 out of reset.
         w.bits(m | n << 6 | (p / 2 - 1) << 16 | 1 << 22 | q << 24 | 1 << 29)
     });
+    // Clock security: a crystal that stops raises the NMI, which dumps the brake (7.2.7).
+    set(19);
     set(24);
     if !wait_for(LIMIT, || is_set(25)) {
         return false;

@@ -2,10 +2,11 @@
 
 use muslip_control::board::EncoderReading;
 use muslip_control::encoder::rising_edges;
-use stm32f4::stm32f405::{RCC, TIM2, TIM3, TIM4, TIM5};
+use stm32f4::stm32f405::{TIM2, TIM3, TIM4, TIM5};
 
-/// Input filter of counters and captures alike: eight equal samples at the timer's clock (18.4.7: IC1F).
-const FILTER: u32 = 0b0011;
+use super::bus::Bus;
+use crate::registers::{self, set_up};
+
 /// How often a reading is tried again when an edge comes in its middle: a second edge within it is rare.
 const TRIES: u32 = 4;
 
@@ -15,36 +16,6 @@ pub struct Encoders {
     vehicle: TIM4,
     wheel_stamp: TIM5,
     vehicle_stamp: TIM2,
-}
-
-macro_rules! start_counter {
-    ($timer:expr, $a_is_high:expr) => {{
-        // Encoder mode on TI1's edges, direction by TI2's level (18.4.3: SMS = 010).
-        $timer
-            .ccmr1_input()
-            .write(|w| unsafe { w.bits((1 | FILTER << 4 | 1 << 8 | FILTER << 12) as _) });
-        $timer.smcr().write(|w| unsafe { w.bits(0b010) });
-        $timer.arr().write(|w| unsafe { w.bits(0xFFFF) });
-        // Odd while A is high, from the start: see `rising_edges`.
-        $timer
-            .cnt()
-            .write(|w| unsafe { w.bits(u32::from($a_is_high) as _) });
-        $timer.cr1().write(|w| unsafe { w.bits(1) });
-    }};
-}
-
-macro_rules! start_stamp {
-    ($timer:expr) => {{
-        // Free-running over 32 bits, capture of TI1's rising edge (18.4.7, 18.4.9).
-        $timer.psc().write(|w| unsafe { w.bits(0) });
-        $timer.arr().write(|w| unsafe { w.bits(u32::MAX as _) });
-        $timer
-            .ccmr1_input()
-            .write(|w| unsafe { w.bits((1 | FILTER << 4) as _) });
-        $timer.ccer().write(|w| unsafe { w.bits(1) });
-        $timer.egr().write(|w| unsafe { w.bits(1) });
-        $timer.cr1().write(|w| unsafe { w.bits(1) });
-    }};
 }
 
 macro_rules! read {
@@ -71,15 +42,10 @@ macro_rules! read {
 
 impl Encoders {
     /// Starts all four timers; pins are set up already.
-    pub fn start(
-        rcc: &RCC,
-        wheel: TIM3,
-        vehicle: TIM4,
-        wheel_stamp: TIM5,
-        vehicle_stamp: TIM2,
-    ) -> Self {
-        rcc.apb1enr()
-            .modify(|r, w| unsafe { w.bits(r.bits() | 0b1111) });
+    pub fn start(wheel: TIM3, vehicle: TIM4, wheel_stamp: TIM5, vehicle_stamp: TIM2) -> Self {
+        set_up(&registers::ENCODERS, &mut Bus);
+        wheel_stamp.egr().write(|w| unsafe { w.bits(1) });
+        vehicle_stamp.egr().write(|w| unsafe { w.bits(1) });
         // SAFETY: reading levels has no effect.
         let (wheel_high, vehicle_high) = unsafe {
             (
@@ -87,10 +53,14 @@ impl Encoders {
                 (*stm32f4::stm32f405::GPIOB::ptr()).idr().read().bits() & 1 << 6 != 0,
             )
         };
-        start_counter!(wheel, wheel_high);
-        start_counter!(vehicle, vehicle_high);
-        start_stamp!(wheel_stamp);
-        start_stamp!(vehicle_stamp);
+        // Odd while A is high, from the start: see `rising_edges`.
+        wheel
+            .cnt()
+            .write(|w| unsafe { w.bits(u32::from(wheel_high) as _) });
+        vehicle
+            .cnt()
+            .write(|w| unsafe { w.bits(u32::from(vehicle_high) as _) });
+        set_up(&registers::COUNTERS_ON, &mut Bus);
         Self::untouched(wheel, vehicle, wheel_stamp, vehicle_stamp)
     }
 

@@ -11,6 +11,7 @@
 )]
 
 mod bridge;
+mod bus;
 mod clock;
 mod encoders;
 mod flash;
@@ -21,12 +22,14 @@ use muslip_control::board::{Actuators, NotStored, RawSample, Sensors};
 use muslip_control::brake::BrakeOutput;
 use muslip_control::store::{Loaded, Store};
 use muslip_record::Parameters;
-use stm32f4::stm32f405::{ADC_COMMON, ADC1, GPIOB, IWDG, Peripherals, RCC};
+use stm32f4::stm32f405::{ADC1, GPIOB, IWDG, Peripherals};
 
 use crate::counter::cycles;
-use crate::settings::{ADC_DIVIDER_BITS, supply_mv, wait_for};
+use crate::registers::{self, set_up};
+use crate::settings::{CORE_HZ, supply_mv, wait_for};
 use crate::valves::Valves;
 use bridge::Bridge;
+use bus::Bus;
 use encoders::Encoders;
 use flash::ParameterFlash;
 use outputs::{DumpPin, ValvePwm};
@@ -35,6 +38,9 @@ pub use clock::runs_at_full_clock;
 
 /// Line of GPIOB that is high while the emergency stop's loop is closed.
 const EMERGENCY_STOP_LINE: u32 = 1;
+
+/// End of conversion, of the ADC's status (13.13.1).
+const EOC: u32 = 1 << 1;
 
 /// The rig's sensors.
 pub struct ChipSensors {
@@ -59,6 +65,8 @@ pub struct Up {
     pub actuators: ChipActuators,
     /// Parameters from flash.
     pub loaded: Option<Loaded>,
+    /// Whether every register that was set up holds what it should.
+    pub set_up: bool,
     /// Whether the PLL runs.
     pub full_clock: bool,
     /// Whether the watchdog caused the reset.
@@ -69,25 +77,27 @@ pub struct Up {
 pub fn start(_: &Peripherals) -> Up {
     // SAFETY: called once before interrupts; each part takes the peripherals that are its own.
     let p = unsafe { Peripherals::steal() };
-    gpio::dump_line_low(&p.RCC, &p.GPIOB);
+    gpio::dump_line_low(&p.GPIOB);
     let full_clock = clock::start(&p.RCC, &p.FLASH);
     // RCC_CSR (7.3.21): IWDGRSTF bit 29; RMVF bit 24 clears the flags.
     let watchdog_reset = p.RCC.csr().read().bits() & 1 << 29 != 0;
     p.RCC
         .csr()
         .modify(|r, w| unsafe { w.bits(r.bits() | 1 << 24) });
-    gpio::start(&p.RCC, &p.GPIOA, &p.GPIOB, &p.GPIOC);
-    start_supply(&p.RCC, &p.ADC_COMMON, &p.ADC1);
-    let valves = Valves::new(outputs::start_pwm(&p.RCC, p.TIM1), DumpPin);
+    gpio::start(&p.GPIOB, &p.GPIOC);
+    start_supply(&p.ADC1);
+    let valves = Valves::new(outputs::start_pwm(p.TIM1), DumpPin);
     let mut store = Store::new(ParameterFlash::new(p.FLASH));
     let loaded = store.load().ok().flatten();
+    let sensors = ChipSensors {
+        encoders: Encoders::start(p.TIM3, p.TIM4, p.TIM5, p.TIM2),
+        bridge: Bridge::start(p.SPI2),
+        adc: p.ADC1,
+        ports: p.GPIOB,
+    };
     Up {
-        sensors: ChipSensors {
-            encoders: Encoders::start(&p.RCC, p.TIM3, p.TIM4, p.TIM5, p.TIM2),
-            bridge: Bridge::start(&p.RCC, p.SPI2),
-            adc: p.ADC1,
-            ports: p.GPIOB,
-        },
+        sensors,
+        set_up: check_registers(),
         actuators: ChipActuators {
             valves,
             store,
@@ -99,20 +109,33 @@ pub fn start(_: &Peripherals) -> Up {
     }
 }
 
-/// ADC1 on channel 10 (PC0), one conversion for each sample (13.13: CCR, SMPR1, SQR3, CR2).
-fn start_supply(rcc: &RCC, common: &ADC_COMMON, adc: &ADC1) {
-    rcc.apb2enr()
-        .modify(|r, w| unsafe { w.bits(r.bits() | 1 << 8) });
-    common
-        .ccr()
-        .write(|w| unsafe { w.bits(ADC_DIVIDER_BITS << 16) });
-    adc.smpr1().write(|w| unsafe { w.bits(0b111) });
-    adc.sqr3().write(|w| unsafe { w.bits(10) });
-    adc.cr2().write(|w| unsafe { w.bits(1) });
-    // The first conversion, so that the first sample finds one. t_STAB is 3 us.
-    wait_for(1_000, || false);
+/// Whether every register that was set up holds what it should.
+pub fn registers_hold() -> bool {
+    registers::first_wrong(&mut Bus).is_none()
+}
+
+/// The same; the first register that does not is logged.
+fn check_registers() -> bool {
+    let wrong = registers::first_wrong(&mut Bus);
+    if let Some((setting, read)) = wrong {
+        defmt::error!(
+            "register {=str} holds {=u32:08x}, not {=u32:08x} in {=u32:08x}",
+            setting.name,
+            read,
+            setting.value,
+            setting.mask
+        );
+    }
+    wrong.is_none()
+}
+
+/// ADC1, and its first conversion, so that the first sample finds one.
+fn start_supply(adc: &ADC1) {
+    set_up(&registers::SUPPLY, &mut Bus);
+    // t_STAB is 3 us (data sheet, table 67).
+    cortex_m::asm::delay(CORE_HZ / 100_000);
     adc.cr2().write(|w| unsafe { w.bits(1 | 1 << 30) });
-    wait_for(100_000, || adc.sr().read().bits() & 1 << 1 != 0);
+    wait_for(100_000, || adc.sr().read().bits() & EOC != 0);
 }
 
 /// Instructions of one look at the sensors, counted in the emulator, where every bus is ready at once and the bridge's
@@ -134,8 +157,11 @@ pub fn sampling_instructions() -> u32 {
 impl Sensors for ChipSensors {
     fn read(&mut self) -> RawSample {
         let [wheel, vehicle] = self.encoders.read();
-        // The result of the conversion started a sample ago.
+        // The result of the conversion started a sample ago; without one the supply counts as lost. Reading it
+        // clears the flag.
+        let converted = self.adc.sr().read().bits() & EOC != 0;
         let code = self.adc.dr().read().bits() as u16;
+        let code = if converted { code } else { 0 };
         self.adc.cr2().write(|w| unsafe { w.bits(1 | 1 << 30) });
         RawSample {
             wheel,
@@ -164,12 +190,8 @@ const RELOAD_ERASING: u32 = 4095;
 pub fn start_watchdog() {
     // SAFETY: IWDG is used here before the main loop does.
     let watchdog = unsafe { IWDG::steal() };
-    // DBGMCU_APB1_FZ (38.16.4): the watchdog stands while a debugger has stopped the core.
-    unsafe {
-        (*stm32f4::stm32f405::DBGMCU::ptr())
-            .apb1_fz()
-            .modify(|r, w| w.bits(r.bits() | 1 << 12));
-    }
+    // It runs on while a debugger has stopped the core (DBGMCU_APB1_FZ is left at 0): valves must not stay
+    // energised by a program that stands.
     watchdog.kr().write(|w| unsafe { w.bits(KEY_START as _) });
     set_watchdog(&watchdog, 0, RELOAD_SAMPLING);
 }

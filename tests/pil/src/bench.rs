@@ -100,11 +100,14 @@ impl Bench {
         let (qemu, first) = Qemu::start(image)?;
         let FromFirmware::Ready {
             sampling_instructions,
+            registers_hold,
             priorities,
         } = first
         else {
             bail!("at start-up: {first:?}");
         };
+        // The emulator has not run the chip's start-up: a check that found nothing wrong there would find nothing.
+        ensure!(!registers_hold, "the check of the registers finds nothing");
         let mut bench = Self {
             qemu,
             native: Native::new()?,

@@ -59,6 +59,7 @@ impl Native {
             emulated: true,
             watchdog_reset: false,
             slow_clock: false,
+            set_up: true,
             parameters: Origin::BuiltIn,
         };
         let controller = Controller::new(&Parameters::default(), identity)

@@ -123,6 +123,7 @@ pub const IDENTITY: Identity = Identity {
     emulated: false,
     watchdog_reset: false,
     slow_clock: false,
+    set_up: true,
     parameters: Origin::Stored,
 };
 

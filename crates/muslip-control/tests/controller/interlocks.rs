@@ -189,7 +189,7 @@ fn an_estimator_that_refuses_its_own_state_is_a_fault() {
 }
 
 #[test]
-fn a_watchdog_reset_and_a_slow_clock_forbid_arming() {
+fn a_watchdog_reset_a_slow_clock_and_a_failed_set_up_forbid_arming() {
     let mut bench = Bench::with(Identity {
         watchdog_reset: true,
         ..IDENTITY
@@ -204,5 +204,12 @@ fn a_watchdog_reset_and_a_slow_clock_forbid_arming() {
     });
     bench.run(10);
     let refused = Answer::Refused(Refusal::Interlock(Fault::Clock));
+    assert_eq!(bench.say(Command::Arm), refused);
+    let mut bench = Bench::with(Identity {
+        set_up: false,
+        ..IDENTITY
+    });
+    bench.run(10);
+    let refused = Answer::Refused(Refusal::Interlock(Fault::SetUp));
     assert_eq!(bench.say(Command::Arm), refused);
 }

@@ -8,7 +8,7 @@ use muslip_control::emulation::{FromFirmware, ToFirmware};
 use muslip_record::{Command, Event, Profile, State};
 
 use super::{Found, LAW, RAMP, found};
-use crate::bench::Bench;
+use crate::bench::{Bench, Worst};
 use crate::log;
 use crate::qemu::Qemu;
 
@@ -135,22 +135,27 @@ pub fn free_run(image: &Path) -> Result<Found> {
     ))
 }
 
-/// A hard fault in the image, and a panic in the image made for it, dump the brake before anything else.
+/// A hard fault and the end of the crystal in the image, and a panic in the image made for it, dump the brake before
+/// anything else.
 pub fn fault_handlers(image: &Path, panic_image: &Path) -> Result<Found> {
-    let mut bench = Bench::start(image, LAW, 9)?;
-    bench.begin(RAMP)?;
-    bench.until(State::Ramp, 1_000)?;
-    bench.run(100)?;
-    ensure!(bench.brake.hold_pressure);
-    bench.qemu.say(&ToFirmware::HardFault)?;
-    let said = bench.qemu.hear()?;
-    ensure!(
-        said == FromFirmware::Dumped {
-            panic: false,
-            output: BrakeOutput::DUMPED
-        },
-        "{said:?}"
-    );
+    let mut worst = Worst::default();
+    for message in [ToFirmware::HardFault, ToFirmware::NonMaskable] {
+        let mut bench = Bench::start(image, LAW, 9)?;
+        bench.begin(RAMP)?;
+        bench.until(State::Ramp, 1_000)?;
+        bench.run(100)?;
+        ensure!(bench.brake.hold_pressure);
+        bench.qemu.say(&message)?;
+        let said = bench.qemu.hear()?;
+        ensure!(
+            said == FromFirmware::Dumped {
+                panic: false,
+                output: BrakeOutput::DUMPED
+            },
+            "{message:?}: {said:?}"
+        );
+        worst = worst.most(bench.worst);
+    }
     let (_, said) = Qemu::start(panic_image)?;
     ensure!(
         said == FromFirmware::Dumped {
@@ -159,5 +164,8 @@ pub fn fault_handlers(image: &Path, panic_image: &Path) -> Result<Found> {
         },
         "{said:?}"
     );
-    Ok(found(&bench, "hard fault and panic".to_owned()))
+    Ok(Found {
+        line: "hard fault, crystal and panic".to_owned(),
+        worst,
+    })
 }
