@@ -289,3 +289,26 @@ fn a_restart_forgets_speeds_and_keeps_the_mass() {
     assert!((after.covariance.std().mass_kg - mass_std).abs() < 1e-9);
     assert_eq!(filter.motion(), Motion::Rolling);
 }
+
+#[test]
+fn a_channel_outside_the_gate_is_believed_after_five_of_its_own_whatever_the_others_say() {
+    let (mut filter, _) = braked(0.5);
+    for round in 0..12 {
+        filter.predict(900.0).unwrap();
+        let wheel_speed = filter.estimate().state.wheel_speed_rad_s;
+        let healthy = filter.update(&wheel(wheel_speed + 1e-4 * f64::from(round)));
+        assert_eq!(healthy.unwrap().decision, Decision::Accepted);
+        let off = filter.update(&Measurement {
+            channel: Channel::NormalForce,
+            // Far off in either direction, so that believing it once does not settle it.
+            value: if round % 2 == 0 { 1e7 } else { -1e7 },
+            variance: 1.0,
+        });
+        let expected = if round % 6 == 5 {
+            Decision::Accepted
+        } else {
+            Decision::Rejected
+        };
+        assert_eq!(off.unwrap().decision, expected, "{round}");
+    }
+}

@@ -301,6 +301,8 @@ pub struct QuarterCar {
     pub state: [f32; 5],
     /// Their covariance: the upper triangle, row by row.
     pub covariance: [f32; 15],
+    /// Readings left out so far because they were too far off: wheel speed, vehicle speed, drag, normal force.
+    pub rejected: [u16; 4],
 }
 
 /// What the link has seen.

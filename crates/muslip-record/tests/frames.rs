@@ -47,6 +47,7 @@ fn samples_and_estimates_leave_a_fifth_of_the_wire_free() {
         tick: u32::MAX,
         state: [0.1; 5],
         covariance: [0.1; 15],
+        rejected: [u16::MAX; 4],
     });
     let sample = length(&envelope(worst_sample()));
     let estimate = length(&envelope(worst_estimate())) + length(&envelope(quarter_car));

@@ -18,10 +18,31 @@ pub struct Filter<T> {
     estimate: Estimate<T>,
     motion: Motion,
     last_wheel_speed_rad_s: Option<T>,
-    gated_in_a_row: u8,
+    gated_in_a_row: Gated,
 }
 
-/// Readings outside the gate, one after the other, that are rejected before one is believed: then it is the
+/// Readings of each channel outside the gate, one after the other. One count for all would be set back by every
+/// healthy channel, and the one that is off would stay locked out.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+struct Gated {
+    wheel_speed: u8,
+    vehicle_speed: u8,
+    drag_force: u8,
+    normal_force: u8,
+}
+
+impl Gated {
+    fn of(&mut self, channel: Channel) -> &mut u8 {
+        match channel {
+            Channel::WheelSpeed => &mut self.wheel_speed,
+            Channel::VehicleSpeed => &mut self.vehicle_speed,
+            Channel::DragForce => &mut self.drag_force,
+            Channel::NormalForce => &mut self.normal_force,
+        }
+    }
+}
+
+/// Readings of a channel outside the gate, one after the other, that are rejected before one is believed: then it is the
 /// estimate that is off, not the sensor.
 const GATE_PATIENCE: u8 = 5;
 
@@ -62,7 +83,7 @@ impl<T: Real> Filter<T> {
                 Motion::Standstill
             },
             last_wheel_speed_rad_s: None,
-            gated_in_a_row: 0,
+            gated_in_a_row: Gated::default(),
         }
     }
 
@@ -156,7 +177,7 @@ impl<T: Real> Filter<T> {
         self.estimate = started.estimate;
         self.motion = started.motion;
         self.last_wheel_speed_rad_s = None;
-        self.gated_in_a_row = 0;
+        self.gated_in_a_row = Gated::default();
         Ok(())
     }
 
@@ -198,8 +219,8 @@ impl<T: Real> Filter<T> {
         Ok(predicted.motion)
     }
 
-    /// Corrects the estimate with one reading, or rejects it: outside the gate (but not more than five in
-    /// a row), or a wheel speed that repeats the last reading exactly where the configuration says that a
+    /// Corrects the estimate with one reading, or rejects it: outside the gate (but not more than five of a
+    /// channel in a row), or a wheel speed that repeats the last reading exactly where the configuration says that a
     /// healthy sensor does not. A correction leaves vehicle speed at or above zero and at least a tenth of
     /// the mass at the start.
     ///
@@ -222,12 +243,13 @@ impl<T: Real> Filter<T> {
             return Ok(fusion);
         }
         let outside = self.config.nis_gate.is_some_and(|gate| fusion.nis > gate);
-        if outside && self.gated_in_a_row < GATE_PATIENCE {
-            self.gated_in_a_row += 1;
+        let gated_in_a_row = self.gated_in_a_row.of(measurement.channel);
+        if outside && *gated_in_a_row < GATE_PATIENCE {
+            *gated_in_a_row += 1;
             fusion.decision = Decision::Rejected;
             return Ok(fusion);
         }
-        self.gated_in_a_row = 0;
+        *gated_in_a_row = 0;
         self.estimate = corrected.estimate;
         // Noise must not carry a vehicle that brakes to rest backwards.
         let speed = &mut self.estimate.state.vehicle_speed_m_s;
