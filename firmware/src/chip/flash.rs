@@ -55,11 +55,12 @@ impl ParameterFlash {
         &mut self,
         work: impl FnOnce(&Self) -> Result<(), FlashFailed>,
     ) -> Result<(), FlashFailed> {
-        self.idle()?;
+        // Errors of what was done before are none of this: cleared, they block nothing.
+        self.finished()?;
+        self.0.sr().write(|w| unsafe { w.bits(ERRORS) });
         for key in [0x4567_0123, 0xCDEF_89AB] {
             self.0.keyr().write(|w| unsafe { w.bits(key) });
         }
-        self.0.sr().write(|w| unsafe { w.bits(ERRORS) });
         let result = work(self);
         self.control(LOCK);
         // The data cache may hold what was there before (3.5.2): off, reset, on.
@@ -75,14 +76,19 @@ impl ParameterFlash {
         result
     }
 
-    /// Waits for the flash; an error flag is an error.
-    fn idle(&self) -> Result<(), FlashFailed> {
+    /// Waits for the flash, and answers its status.
+    fn finished(&self) -> Result<u32, FlashFailed> {
         let mut status = 0;
         let done = wait_for(LIMIT, || {
             status = self.0.sr().read().bits();
             status & BUSY == 0
         });
-        if done && status & ERRORS == 0 {
+        done.then_some(status).ok_or(FlashFailed)
+    }
+
+    /// Waits for the flash; an error flag is an error.
+    fn idle(&self) -> Result<(), FlashFailed> {
+        if self.finished()? & ERRORS == 0 {
             Ok(())
         } else {
             Err(FlashFailed)
