@@ -101,6 +101,25 @@ fn every_interlock_dumps_the_brake_on_the_sample_on_which_its_condition_holds() 
 }
 
 #[test]
+fn a_vehicle_that_is_driven_too_fast_dumps_the_brake_at_its_limit() {
+    let mut bench = Bench::new();
+    bench.rig = Rig::rolling(44.5);
+    bench.start(RAMP);
+    bench.run(400);
+    assert!(bench.output.hold_pressure);
+    while bench.state() == State::Ramp {
+        // 20 m/s² more.
+        bench.rig.vehicle_m_s += 0.02;
+        bench.rig.wheel_rad_s += 0.02 / 0.31;
+        bench.run(1);
+    }
+    assert_eq!(bench.controller.fault(), Some(Fault::Overspeed));
+    assert_eq!(bench.output, BrakeOutput::DUMPED);
+    let speed = bench.rig.vehicle_m_s;
+    assert!((45.0..45.05).contains(&speed), "{speed}");
+}
+
+#[test]
 fn a_silent_host_dumps_the_brake_after_250_ms() {
     let mut bench = Bench::braking();
     bench.say(Command::KeepAlive);

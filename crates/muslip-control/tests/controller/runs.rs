@@ -1,9 +1,9 @@
 //! Runs from arming to their end.
 
 use muslip_control::brake::BrakeOutput;
-use muslip_record::{Command, Event, Fault, Profile, Program, STEPS, State, Telemetry};
+use muslip_record::{Answer, Command, Event, Fault, Profile, Program, STEPS, State, Telemetry};
 
-use crate::bench::{Bench, RAMP};
+use crate::bench::{Bench, RAMP, Rig};
 
 /// A wheel that slips as the demand says, at once: enough to walk through every state.
 fn follow(bench: &mut Bench, samples: u32) -> Vec<State> {
@@ -120,4 +120,33 @@ fn a_wheel_that_does_not_roll_again_after_a_release_is_a_fault() {
     assert_eq!(bench.state(), State::Release);
     bench.run(20);
     assert_eq!(bench.controller.fault(), Some(Fault::Timeout));
+}
+
+#[test]
+fn armed_without_a_start_for_60_s_is_idle_again() {
+    let mut bench = Bench::new();
+    bench.run(50);
+    assert_eq!(bench.say(Command::Arm), Answer::Done);
+    let since = bench.samples;
+    while bench.state() == State::Armed && bench.samples < since + 70_000 {
+        bench.run(1);
+    }
+    assert_eq!(bench.state(), State::Idle);
+    assert_eq!(bench.samples - since, 60_001);
+    assert_eq!(bench.controller.fault(), None);
+}
+
+#[test]
+fn a_speed_that_is_not_reached_within_120_s_is_a_fault() {
+    let mut bench = Bench::new();
+    bench.rig = Rig::rolling(10.0);
+    bench.start(RAMP);
+    let since = bench.samples;
+    while bench.state() == State::SpinUp && bench.samples < since + 130_000 {
+        bench.run(1);
+    }
+    assert_eq!(bench.controller.fault(), Some(Fault::Timeout));
+    assert_eq!(bench.output, BrakeOutput::DUMPED);
+    let waited = bench.samples - since;
+    assert!((120_000..=120_002).contains(&waited), "{waited}");
 }
