@@ -1,6 +1,12 @@
 //! What a mechanism says of itself and what it does.
 
-use super::prelude::*;
+use super::guide::Guide;
+use super::id::Id;
+use super::state::{Law, State};
+use crate::balance::Balance;
+use crate::context::Context;
+use crate::number::Number;
+use crate::series::Series;
 
 /// Where in the chain from speeds to reading a mechanism acts; stages run in this order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
