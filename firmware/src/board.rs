@@ -15,11 +15,13 @@ use stm32f4::stm32f405::{Interrupt, Peripherals, USART1};
 use crate::counter::{Most, cycles, is_emulated};
 use crate::settings::{CORE_HZ, HSI_HZ};
 use crate::uart::LinkEnd;
-use crate::{chip, emulator, uart};
+use crate::{chip, emulator, fault, uart};
 
 /// Priorities of the interrupts, in the upper four bits of their registers: 0 goes first.
-const LINK_PRIORITY: u8 = 0;
-const SAMPLING_PRIORITY: u8 = 1;
+/// 0 is the memory fault's: an overflow of the stack must be one in every interrupt.
+const LINK_PRIORITY: u8 = 1;
+const SAMPLING_PRIORITY: u8 = 2;
+const RIG_PRIORITY: u8 = 3;
 
 /// Does something with sampling held off, and the link not.
 pub fn without_sampling<T>(work: impl FnOnce() -> T) -> T {
@@ -139,6 +141,8 @@ pub struct Started {
     reason = "start-up takes the peripherals and sets priorities"
 )]
 pub fn start() -> Started {
+    fault::guard_stack();
+    let end = fault::last_end();
     // SAFETY: called once, from `main`, before any interrupt is enabled.
     let peripherals = unsafe { Peripherals::steal() };
     // Set on silicon whenever the core runs from reset; never in QEMU, which does not model RCC.
@@ -152,7 +156,9 @@ pub fn start() -> Started {
         let identity = Identity {
             core_clock_hz: CORE_HZ,
             emulated,
-            watchdog_reset: false,
+            watchdog_reset: end.is_some(),
+            reset_flags: 0,
+            end,
             slow_clock: false,
             set_up: true,
             parameters: Origin::BuiltIn,
@@ -167,7 +173,9 @@ pub fn start() -> Started {
         let identity = Identity {
             core_clock_hz: if up.full_clock { CORE_HZ } else { HSI_HZ },
             emulated,
-            watchdog_reset: up.watchdog_reset,
+            watchdog_reset: up.watchdog_reset || end.is_some(),
+            reset_flags: up.reset_flags,
+            end,
             slow_clock: !up.full_clock,
             set_up: up.set_up,
             parameters: match up.loaded {
@@ -221,7 +229,7 @@ pub fn start_sampling() {
             .set_priority(Interrupt::USART2, LINK_PRIORITY << 4);
         core.SCB
             .set_priority(SystemHandler::SysTick, SAMPLING_PRIORITY << 4);
-        core.NVIC.set_priority(Interrupt::USART3, 2 << 4);
+        core.NVIC.set_priority(Interrupt::USART3, RIG_PRIORITY << 4);
     }
     if is_emulated() {
         let sampling_instructions = chip::sampling_instructions();

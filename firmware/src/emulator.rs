@@ -253,9 +253,20 @@ fn obey(message: &ToFirmware) {
             timer.enable_counter();
         }
         ToFirmware::HardFault => cortex_m::asm::udf(),
+        ToFirmware::ExhaustStack => {
+            core::hint::black_box(deeper(&[0; 16]));
+        }
         // SAFETY: NMIPENDSET (ARMv7-M, B3.2.4); zeros change nothing.
         ToFirmware::NonMaskable => unsafe { (*SCB::PTR).icsr.write(1 << 31) },
     }
+}
+
+/// Calls itself until the stack is used up.
+#[inline(never)]
+#[allow(unconditional_recursion, reason = "that is what it is for")]
+fn deeper(words: &[u32; 16]) -> u32 {
+    let more = core::hint::black_box([words[0].wrapping_add(1); 16]);
+    deeper(&more).wrapping_add(more[1])
 }
 
 #[allow(

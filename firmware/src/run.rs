@@ -19,7 +19,7 @@ use crate::queue::{self, Sender, Taker};
 use crate::settings::CYCLES_PER_SAMPLE;
 use crate::totals::{LATE, RAISED, WORKED, count};
 use crate::uart::LinkEnd;
-use crate::{board, dump, stack, uart};
+use crate::{board, dump, fault, stack, uart};
 
 /// Samples that may wait for the main loop; more than one is already a missed deadline.
 const WAITING_SAMPLES: usize = 4;
@@ -208,6 +208,7 @@ impl Loop {
         self.resources.worst_step_cycles = self.resources.worst_step_cycles.max(step);
         uart::kick();
         let state = self.controller.state();
+        fault::remember(state);
         if state != self.state {
             defmt::info!(
                 "{} -> {}, fault {}",

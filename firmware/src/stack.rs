@@ -2,6 +2,10 @@
 
 use cortex_m_rt::STACK_PAINT_VALUE;
 
+/// Bytes at the end of the stack that are out of bounds: the largest frame of an exception and what a handler's first
+/// push takes come to lie in them, not beyond.
+pub const GUARD_BYTES: usize = 512;
+
 /// Deepest use so far in bytes.
 #[allow(
     unsafe_code,
@@ -13,7 +17,8 @@ pub fn used_bytes() -> u32 {
         static _stack_end: u32;
     }
     let top = &raw const _stack_start;
-    let mut at = &raw const _stack_end;
+    // What is out of bounds was not used.
+    let mut at = (&raw const _stack_end).wrapping_byte_add(GUARD_BYTES);
     // SAFETY: both symbols bound the stack's region (memory.x), which is all readable memory; volatile because
     // this function's own frame lies in it.
     while at < top && unsafe { at.read_volatile() } == STACK_PAINT_VALUE {

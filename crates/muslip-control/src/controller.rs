@@ -3,8 +3,8 @@
 use heapless::Vec;
 use muslip::sample::RigSample;
 use muslip_record::{
-    Answer, Command, Event, Fault, Hello, Origin, PROTOCOL_VERSION, Parameters, Refusal,
-    SAMPLE_RATE_HZ, SAMPLES_PER_ESTIMATE, SCHEMA_HASH, Sample, State, Status, Telemetry,
+    Answer, Command, Event, Fault, Hello, Origin, PROTOCOL_VERSION, Parameters, PostMortem,
+    Refusal, SAMPLE_RATE_HZ, SAMPLES_PER_ESTIMATE, SCHEMA_HASH, Sample, State, Status, Telemetry,
 };
 
 use crate::board::{Actuators, BridgeQuality, NotStored, RawSample};
@@ -27,8 +27,12 @@ pub struct Identity {
     pub core_clock_hz: u32,
     /// True in the emulator.
     pub emulated: bool,
-    /// The independent watchdog caused the reset.
+    /// The independent watchdog caused the reset, or a fault handler.
     pub watchdog_reset: bool,
+    /// What caused the reset: the upper byte of the chip's RCC_CSR.
+    pub reset_flags: u8,
+    /// How the program came to its end before the reset, if it did.
+    pub end: Option<PostMortem>,
     /// The core runs slower than it should.
     pub slow_clock: bool,
     /// Every register holds what start-up wrote to it.
@@ -309,6 +313,7 @@ impl Controller {
             sample_rate_hz: SAMPLE_RATE_HZ,
             core_clock_hz: self.identity.core_clock_hz,
             emulated: self.identity.emulated,
+            end: self.identity.end,
         }
     }
 
@@ -324,6 +329,8 @@ impl Controller {
             worst_step_cycles: self.resources.worst_step_cycles,
             stack_used_bytes: self.resources.stack_used_bytes,
             parameters: self.identity.parameters,
+            reset_flags: self.identity.reset_flags,
+            end: self.identity.end,
         }
     }
 

@@ -33,6 +33,8 @@ pub enum ToFirmware {
     },
     /// Execute an undefined instruction, as memory gone bad would.
     HardFault,
+    /// Call without end, as a program gone wrong would.
+    ExhaustStack,
     /// Raise the interrupt that cannot be masked, as the crystal's end would.
     NonMaskable,
 }

@@ -19,7 +19,7 @@
 //! | `EstimatorFault` | the filter refused an update or is not finite |
 //! | `DeadlineMissed` | a sample was not taken in time, or its work took longer than a sample |
 //! | `BrownOut` | supply of the valves below its limit |
-//! | `Watchdog` | the independent watchdog caused the last reset; until cleared |
+//! | `Watchdog` | the independent watchdog or a fault handler caused the last reset; until cleared |
 //! | `Clock` | the core does not run at its full clock; for good |
 //! | `Timeout` | a state lasted longer than it may, see [`sequence`](crate::sequence) |
 //! | `SetUp` | a register of the chip does not hold what start-up wrote to it; for good |

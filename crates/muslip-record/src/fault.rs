@@ -1,6 +1,6 @@
-//! The faults in order; not beside their type, whose source makes the schema's hash.
+//! Faults, states and ends in order; not beside their types, whose source makes the schema's hash.
 
-use crate::Fault;
+use crate::{End, Fault, State};
 
 impl Fault {
     /// In the order of their numbers, which is the order in which they are named.
@@ -25,4 +25,24 @@ impl Fault {
         Self::Timeout,
         Self::SetUp,
     ];
+}
+
+impl State {
+    /// In the order of their numbers.
+    pub const ALL: [Self; 9] = [
+        Self::Idle,
+        Self::Armed,
+        Self::SpinUp,
+        Self::Ramp,
+        Self::Skid,
+        Self::Release,
+        Self::Cool,
+        Self::Done,
+        Self::Fault,
+    ];
+}
+
+impl End {
+    /// In the order of their numbers.
+    pub const ALL: [Self; 4] = [Self::HardFault, Self::Stack, Self::Panic, Self::Crystal];
 }

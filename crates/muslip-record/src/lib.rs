@@ -56,8 +56,8 @@ pub use parameters::{
     Parameters, SlipControlParameters, TyreRange, WheelParameters,
 };
 pub use wire::{
-    Answer, Command, Envelope, Estimate, Event, Fault, Hello, LinkCounters, Origin, Profile,
-    Program, QuarterCar, Refusal, STEPS, Sample, State, Status, Telemetry,
+    Answer, Command, End, Envelope, Estimate, Event, Fault, Hello, LinkCounters, Origin,
+    PostMortem, Profile, Program, QuarterCar, Refusal, STEPS, Sample, State, Status, Telemetry,
 };
 
 /// Version of the protocol: raised when the meaning of a field changes though its type does not.

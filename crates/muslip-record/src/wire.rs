@@ -134,6 +134,43 @@ pub struct Hello {
     pub core_clock_hz: u32,
     /// True in the emulator, where sensors and brake are simulated.
     pub emulated: bool,
+    /// How the program came to its end before the last reset, if it did.
+    pub end: Option<PostMortem>,
+}
+
+/// How the program came to its end.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub struct PostMortem {
+    /// What ended it.
+    pub end: End,
+    /// Where it was; after a panic the line of its source; 0 where that is not known.
+    pub program_counter: u32,
+    /// Where it would have returned to; 0 where that is not known.
+    pub link_register: u32,
+    /// The core's configurable fault status, CFSR.
+    pub fault_status: u32,
+    /// The core's hard fault status, HFSR.
+    pub hard_fault_status: u32,
+    /// Address that could not be accessed; 0 where that is not known.
+    pub address: u32,
+    /// Where the run was.
+    pub state: State,
+    /// Samples worked on since the start.
+    pub tick: u32,
+}
+
+/// What ends a program.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[repr(u8)]
+pub enum End {
+    /// A hard fault.
+    HardFault,
+    /// The stack ran out.
+    Stack,
+    /// A panic.
+    Panic,
+    /// The crystal stopped.
+    Crystal,
 }
 
 /// What became of a command.
@@ -371,4 +408,8 @@ pub struct Status {
     pub stack_used_bytes: u32,
     /// Where the parameters in use come from.
     pub parameters: Origin,
+    /// What caused the last reset: bits 31 to 24 of the chip's RCC_CSR; 0 in the emulator.
+    pub reset_flags: u8,
+    /// How the program came to its end before the last reset, if it did.
+    pub end: Option<PostMortem>,
 }

@@ -84,6 +84,17 @@ fn the_longest_messages_fit_a_frame() {
         worst_step_cycles: all,
         stack_used_bytes: all,
         parameters: Origin::Previous,
+        reset_flags: u8::MAX,
+        end: Some(PostMortem {
+            end: End::Stack,
+            program_counter: all,
+            link_register: all,
+            fault_status: all,
+            hard_fault_status: all,
+            address: all,
+            state: State::Fault,
+            tick: all,
+        }),
     });
     let mut parameters = Parameters::default();
     parameters.drag.zero_code = i32::MIN;

@@ -69,6 +69,8 @@ pub struct Up {
     pub set_up: bool,
     /// Whether the PLL runs.
     pub full_clock: bool,
+    /// What caused the reset: the upper byte of RCC_CSR (7.3.21).
+    pub reset_flags: u8,
     /// Whether the watchdog caused the reset.
     pub watchdog_reset: bool,
 }
@@ -80,7 +82,8 @@ pub fn start(_: &Peripherals) -> Up {
     gpio::dump_line_low(&p.GPIOB);
     let full_clock = clock::start(&p.RCC, &p.FLASH);
     // RCC_CSR (7.3.21): IWDGRSTF bit 29; RMVF bit 24 clears the flags.
-    let watchdog_reset = p.RCC.csr().read().bits() & 1 << 29 != 0;
+    let [.., reset_flags] = p.RCC.csr().read().bits().to_le_bytes();
+    let watchdog_reset = reset_flags & 1 << 5 != 0;
     p.RCC
         .csr()
         .modify(|r, w| unsafe { w.bits(r.bits() | 1 << 24) });
@@ -105,6 +108,7 @@ pub fn start(_: &Peripherals) -> Up {
         },
         loaded,
         full_clock,
+        reset_flags,
         watchdog_reset,
     }
 }

@@ -58,6 +58,8 @@ impl Native {
             core_clock_hz: 168_000_000,
             emulated: true,
             watchdog_reset: false,
+            reset_flags: 0,
+            end: None,
             slow_clock: false,
             set_up: true,
             parameters: Origin::BuiltIn,

@@ -110,6 +110,17 @@ impl Qemu {
         Ok(std::fs::read(&self.log)?)
     }
 
+    /// Waits for the image to have started again after a reset of its own, and what its link said last.
+    ///
+    /// # Errors
+    /// As [`Qemu::hear`], or it says something else.
+    pub fn restarted(&mut self) -> Result<()> {
+        let said = self.hear()?;
+        ensure!(matches!(said, FromFirmware::Ready { .. }), "{said:?}");
+        (self.link_to, self.link_from) = (0, 0);
+        Ok(())
+    }
+
     /// Tells the image something.
     ///
     /// # Errors

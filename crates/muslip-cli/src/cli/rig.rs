@@ -257,11 +257,30 @@ fn print_status(status: &Status, terminal: &mut Terminal) -> Result<(), Failure>
                 status.worst_step_cycles
             ),
         ),
+        ("last end of the program", end(status)),
         (
             "deepest stack",
             format!("{} bytes", status.stack_used_bytes),
         ),
     ])
+}
+
+fn end(status: &Status) -> String {
+    let flags = status.reset_flags;
+    match &status.end {
+        None => format!("none; reset flags {flags:#04x}"),
+        Some(end) => format!(
+            "{:?} at {:#010x} from {:#010x}, CFSR {:#010x}, HFSR {:#010x}, address {:#010x}, in {:?}, sample {}; reset flags {flags:#04x}",
+            end.end,
+            end.program_counter,
+            end.link_register,
+            end.fault_status,
+            end.hard_fault_status,
+            end.address,
+            end.state,
+            end.tick
+        ),
+    }
 }
 
 fn standing(bits: u32) -> String {

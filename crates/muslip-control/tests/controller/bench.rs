@@ -122,6 +122,8 @@ pub const IDENTITY: Identity = Identity {
     core_clock_hz: 168_000_000,
     emulated: false,
     watchdog_reset: false,
+    reset_flags: 0,
+    end: None,
     slow_clock: false,
     set_up: true,
     parameters: Origin::Stored,

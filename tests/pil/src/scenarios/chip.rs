@@ -2,15 +2,18 @@
 
 use std::path::Path;
 
-use anyhow::{Result, bail, ensure};
+use anyhow::{Context, Result, bail, ensure};
 use muslip_control::brake::BrakeOutput;
 use muslip_control::emulation::{FromFirmware, ToFirmware};
-use muslip_record::{Command, Event, Profile, State};
+use muslip_record::{
+    Command, End, Envelope, Event, FrameReader, PostMortem, Profile, State, Telemetry,
+};
 
 use super::{Found, LAW, RAMP, found};
 use crate::bench::{Bench, Worst};
 use crate::log;
 use crate::qemu::Qemu;
+use crate::target::{Input, Target};
 
 /// The log says who starts up, every change of state, and the fault; each frame decodes.
 pub fn log(image: &Path) -> Result<Found> {
@@ -135,11 +138,39 @@ pub fn free_run(image: &Path) -> Result<Found> {
     ))
 }
 
-/// A hard fault and the end of the crystal in the image, and a panic in the image made for it, dump the brake before
+/// How the program came to its end, as it tells in its hello after the reset that it made.
+fn told_after_reset(bench: &mut Bench) -> Result<PostMortem> {
+    bench.qemu.restarted()?;
+    let hello = bench.host.framed(Command::Hello)?;
+    let mut reader = FrameReader::new();
+    for link in [&hello[..], &[], &[]] {
+        let output = bench.qemu.sample(&Input {
+            raw: bench.rig.sample(bench.brake),
+            link,
+            room: crate::bench::WIRE_BYTES,
+            burn: 0,
+        })?;
+        ensure!(output.brake == BrakeOutput::DUMPED);
+        for byte in output.link {
+            if let Some(message) = reader.push::<Envelope<Telemetry>>(byte)
+                && let Telemetry::Hello(hello) = message?.body
+            {
+                return hello.end.context("no word of an end");
+            }
+        }
+    }
+    bail!("no hello after the reset")
+}
+
+/// A hard fault, an exhausted stack and the end of the crystal in the image, and a panic in the image made for it, dump the brake before
 /// anything else.
 pub fn fault_handlers(image: &Path, panic_image: &Path) -> Result<Found> {
     let mut worst = Worst::default();
-    for message in [ToFirmware::HardFault, ToFirmware::NonMaskable] {
+    for (message, expected) in [
+        (ToFirmware::HardFault, End::HardFault),
+        (ToFirmware::ExhaustStack, End::Stack),
+        (ToFirmware::NonMaskable, End::Crystal),
+    ] {
         let mut bench = Bench::start(image, LAW, 9)?;
         bench.begin(RAMP)?;
         bench.until(State::Ramp, 1_000)?;
@@ -154,6 +185,11 @@ pub fn fault_handlers(image: &Path, panic_image: &Path) -> Result<Found> {
             },
             "{message:?}: {said:?}"
         );
+        let end = told_after_reset(&mut bench)?;
+        ensure!(
+            end.end == expected && end.state == State::Ramp && end.tick > 100,
+            "{message:?}: {end:?}"
+        );
         worst = worst.most(bench.worst);
     }
     let (_, said) = Qemu::start(panic_image)?;
@@ -165,7 +201,9 @@ pub fn fault_handlers(image: &Path, panic_image: &Path) -> Result<Found> {
         "{said:?}"
     );
     Ok(Found {
-        line: "hard fault, crystal and panic".to_owned(),
+        line:
+            "hard fault, exhausted stack, crystal and panic; the first three told after their reset"
+                .to_owned(),
         worst,
     })
 }
