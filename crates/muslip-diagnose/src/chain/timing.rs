@@ -95,15 +95,40 @@ impl Timing {
         self.brake.value = 0.0;
     }
 
-    /// What the timing of wheel speed and brake was off by, or is not known by, in s: kernels differ by about as much
-    /// as they delay, and what is shorter cannot be told from them.
+    /// What the timing does not tell of the chain.
     #[must_use]
-    pub fn off_by(&self) -> f64 {
-        [self.wheel, self.brake]
+    pub fn untold(&self) -> Untold {
+        let known = |late: &Late| late.std < 0.01;
+        let channels_s = [self.wheel, self.brake]
             .into_iter()
-            .filter(|late| late.std < 0.01)
+            .filter(known)
             .map(|late| late.value.abs() + UNKNOWN_STDS * late.std)
-            .fold(0.0, f64::max)
+            .fold(0.0, f64::max);
+        let drag_s = [self.wheel, self.vehicle]
+            .into_iter()
+            .filter(known)
+            .map(|late| UNKNOWN_STDS * late.std - self.against_drag(late).value)
+            .fold(0.0, f64::max);
+        Untold { channels_s, drag_s }
+    }
+}
+
+/// What the timing of the channels does not tell, in s: kernels differ by about as much as they delay, and a memory that
+/// is shorter cannot be told from them.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Untold {
+    /// What wheel speed and brake were off by, or are not known by.
+    pub channels_s: f64,
+    /// How late the drag may be against the wheel's or the vehicle's speed.
+    pub drag_s: f64,
+}
+
+impl Untold {
+    /// Shortest memory of the tyre that is told from the chain's: longer than what it leaves of the drag's lateness for
+    /// the chain to have caused, for a tyre makes the drag late as well.
+    #[must_use]
+    pub fn shortest_of_tyre_s(self) -> f64 {
+        0.5 * self.drag_s
     }
 }
 
@@ -423,6 +448,21 @@ mod tests {
         let mut no_brake = timing(-0.010, 0.030, 0.0);
         no_brake.brake.std = 0.02;
         assert_eq!(no_brake.drag_late(), None);
+    }
+
+    #[test]
+    fn a_memory_of_the_tyre_is_longer_than_what_it_leaves_to_a_late_drag() {
+        // The drag 10 ms late against both speeds, whether or not it was left so: 3 standard deviations are 0.9 ms.
+        let mut left = timing(-0.010, -0.010, -0.010);
+        let taken_off = left.untold();
+        assert!((taken_off.drag_s - 0.0109).abs() < 1e-9);
+        left.leave(0.010);
+        assert!((left.untold().drag_s - 0.0109).abs() < 1e-9);
+        assert!((left.untold().channels_s - 9e-4).abs() < 1e-9);
+        let shortest = taken_off.shortest_of_tyre_s();
+        assert!((shortest - (taken_off.drag_s - shortest)).abs() < 1e-12);
+        // Speeds that are late say nothing of the drag.
+        assert!(timing(0.010, 0.030, 0.0).untold().drag_s < 1e-9);
     }
 
     #[test]

@@ -10,6 +10,7 @@ pub use rank::softness;
 use trial::{Before, could_stand, left_open, needed};
 pub use trial::{Claim, Trial, stands};
 
+use crate::chain::timing::Untold;
 use crate::constants::{ALIKE_NATS, DEPENDENCE_NATS, DEPENDENCE_SHARE, FORM_LEFT};
 use crate::data::Data;
 use crate::innovations::dependence::{self, Dependence};
@@ -124,14 +125,14 @@ struct Question<'a> {
     data: &'a Data,
     free: Vec<Dependence>,
     excluded: &'a [Id],
-    chain_s: f64,
+    untold: Untold,
 }
 
 impl Question<'_> {
     /// One round beside a model: all trials, best first, and how large each mechanism would have to be to be seen.
     fn round(&self, so_far: &Judged, taken_up: &TakenUp) -> (Vec<Trial>, Vec<Seen>) {
         let data = self.data;
-        let before = Before::new(data, so_far, self.chain_s, taken_up.at_sensors);
+        let before = Before::new(data, so_far, self.untold, taken_up.at_sensors);
         let screen = Screen::new(data, before, &self.free, self.excluded);
         let mut trials = screen.trials();
         // What only the chain remembers has taken the place of other names.
@@ -148,14 +149,14 @@ impl Question<'_> {
     }
 }
 
-/// Decides what is named beside the base model; `chain_s` is what the chain's own timing was off by, in s.
+/// Decides what is named beside the base model; `untold` is what the chain's own timing does not tell.
 #[must_use]
-pub fn decide(data: &Data, base: Judged, excluded: &[Id], chain_s: f64) -> Decision {
+pub fn decide(data: &Data, base: Judged, excluded: &[Id], untold: Untold) -> Decision {
     let question = Question {
         data,
         free: dependence::all(data),
         excluded,
-        chain_s,
+        untold,
     };
     let mut base = settled(data, base);
     let mut chosen = base.clone();
@@ -185,7 +186,7 @@ pub fn decide(data: &Data, base: Judged, excluded: &[Id], chain_s: f64) -> Decis
         chosen = settled(data, trial.judged);
     }
     if chosen.model.terms.len() > 1 {
-        chosen = without_idle(data, chosen, chain_s);
+        chosen = without_idle(data, chosen, untold);
     }
     Decision {
         base,
@@ -229,7 +230,7 @@ fn again(data: &Data, model: &Model, extra: &[Dependence], like: &Judged) -> Opt
 }
 
 /// Takes names out that the others do not need. A free dependence is no other name: it may span any of them.
-fn without_idle(data: &Data, chosen: Judged, chain_s: f64) -> Judged {
+fn without_idle(data: &Data, chosen: Judged, untold: Untold) -> Judged {
     let mut names = chosen.clone();
     if !chosen.extra.is_empty() {
         match again(data, &chosen.model, &[], &chosen) {
@@ -240,7 +241,7 @@ fn without_idle(data: &Data, chosen: Judged, chain_s: f64) -> Judged {
     let all = names.model.terms.len();
     while names.model.terms.len() > 1 {
         let without = without_each(data, &mut names);
-        let Some(fewer) = without_least_needed(data, &names, without, chain_s) else {
+        let Some(fewer) = without_least_needed(data, &names, without, untold) else {
             break;
         };
         names = fewer;
@@ -278,13 +279,13 @@ fn without_least_needed(
     data: &Data,
     names: &Judged,
     without: Vec<Option<Judged>>,
-    chain_s: f64,
+    untold: Untold,
 ) -> Option<Judged> {
     let idle = without.into_iter().enumerate().filter_map(|(at, fewer)| {
         let fewer = fewer?;
         let entry = names.model.terms[at].entry;
         let claim = Claim::Mechanism(data.catalogue.get(entry).id(), entry);
-        let before = Before::new(data, &fewer, chain_s, 0.0);
+        let before = Before::new(data, &fewer, untold, 0.0);
         let trial = before.tried(claim, names.clone(), f64::INFINITY);
         (!needed(&trial)).then(|| (trial.weight(), fewer))
     });

@@ -1,5 +1,6 @@
 //! What a claim gains beside the model so far, and whether it stands.
 
+use crate::chain::timing::Untold;
 use crate::constants::{
     DEPENDENCE_WORTH, INDIFFERENT_NATS, LEAST_EFFECT, LEAST_GAIN, LEAST_GAIN_AT_SENSORS,
     LEAST_GAIN_OF_DEPENDENCE_AT_SENSORS, LEAST_MEMORY_S, LEAST_PREDICTED,
@@ -12,7 +13,7 @@ use crate::innovations::dependence::Dependence;
 use crate::innovations::hypothesis::{Judged, Unseen, capped};
 use crate::innovations::noise::BalanceParts;
 use crate::law::{closest, left_of};
-use crate::mechanism::{Balance, Id};
+use crate::mechanism::{Balance, Id, Kind};
 use crate::number::mean_and_std;
 
 /// What a trial adds to a model.
@@ -154,8 +155,8 @@ pub struct Before<'a> {
     data: &'a Data,
     /// It.
     pub judged: &'a Judged,
-    /// What the chain's own timing was off by, in s.
-    chain_s: f64,
+    /// What the chain's own timing does not tell.
+    untold: Untold,
     /// What was taken up before gained at the sensors' noise, in nats.
     taken_up: f64,
     /// Sum of squares of the drag that its best law leaves, by run.
@@ -165,13 +166,13 @@ pub struct Before<'a> {
 }
 
 impl<'a> Before<'a> {
-    pub fn new(data: &'a Data, judged: &'a Judged, chain_s: f64, taken_up: f64) -> Self {
+    pub fn new(data: &'a Data, judged: &'a Judged, untold: Untold, taken_up: f64) -> Self {
         let noise = capped(&judged.parts);
         let unseen = judged.unseen_under(data, &noise);
         Self {
             data,
             judged,
-            chain_s,
+            untold,
             taken_up,
             squares: squares_by_best_law(data, judged),
             at_sensors: (noise, unseen),
@@ -212,7 +213,14 @@ impl<'a> Before<'a> {
             Some((memory_s, least_memory_s(data, id, entry)))
         });
         let real = in_force && predicts > REAL_MEMORY_PREDICTED && at_sensors.1 > REAL_MEMORY_T;
-        let chain_s = if real { 0.0 } else { self.chain_s };
+        // That a memory is real does not say whose it is: one of the tyre must outlast what it leaves to the chain.
+        let of_tyre =
+            term.is_some_and(|(_, entry, _)| data.catalogue.get(entry).guide().kind == Kind::Tyre);
+        let shortest_s = [
+            (!real).then_some(self.untold.channels_s),
+            of_tyre.then(|| self.untold.shortest_of_tyre_s()),
+        ];
+        let chain_s = shortest_s.into_iter().flatten().fold(0.0, f64::max);
         let price = PRICE_OF_PARAMETER * free + PRICE_OF_NAME;
         Trial {
             claim,

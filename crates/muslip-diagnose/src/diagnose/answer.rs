@@ -43,7 +43,7 @@ impl<'a> Answer<'a> {
     ) -> Option<Self> {
         let (data, timing, base) = timed(given.rig, given.runs, audit, kept, timing)?;
         // Delays of the speeds are the chain's: they are named by what the timing shows.
-        let decision = decide(&data, base, &data.catalogue.delays(), timing.off_by());
+        let decision = decide(&data, base, &data.catalogue.delays(), timing.untold());
         Some(Self {
             given,
             kept,
