@@ -17,10 +17,6 @@ const SMALL_SEED: &str = "1500";
 /// Builds tool and trial in release, then plays the trial with the given further arguments. `--report` is for the
 /// pages: of a commit and nothing else, with the earlier engine on the same files.
 pub fn play(arguments: &[String]) -> Result<()> {
-    play_in(RELEASE, arguments)
-}
-
-fn play_in(profile: &str, arguments: &[String]) -> Result<()> {
     let report = arguments.iter().any(|argument| argument == "--report");
     let small = arguments.iter().any(|argument| argument == "--small");
     let seeded = arguments
@@ -48,11 +44,10 @@ fn play_in(profile: &str, arguments: &[String]) -> Result<()> {
         further.extend(["--out".into(), "docs".into()]);
     }
     run(
-        "tool and trial",
+        "tool and trial, in release",
         cargo(&[
             "build",
-            "--profile",
-            profile,
+            "--release",
             "--locked",
             "--quiet",
             "--package",
@@ -61,17 +56,25 @@ fn play_in(profile: &str, arguments: &[String]) -> Result<()> {
             "sealed-trial",
         ]),
     )?;
-    let mut trial = command(
-        &program(&target(), profile, "sealed-trial"),
-        &["run", "--muslip", &program(&target(), profile, "muslip")],
-    );
-    trial.args(further);
-    run("sealed trial", trial)
+    play_built(RELEASE, "muslip", &further)
 }
 
-/// The small trial: continuous integration's seed, figures held by a ratchet. Of what the tests have built.
+/// The small trial: continuous integration's seed, figures held by a ratchet. Of what the tests have built: their
+/// command is the same `muslip` under another name.
 pub fn small() -> Result<()> {
-    play_in(CHECKED, &["--small".into()])
+    let arguments = ["--small", "--seed", SMALL_SEED].map(str::to_owned);
+    play_built(CHECKED, "muslip-under-test", &arguments)
+}
+
+/// Plays the trial with programs that are built.
+fn play_built(profile: &str, muslip: &str, arguments: &[String]) -> Result<()> {
+    let muslip = program(&target(), profile, muslip);
+    let mut trial = command(
+        &program(&target(), profile, "sealed-trial"),
+        &["run", "--muslip", &muslip],
+    );
+    trial.args(arguments);
+    run("sealed trial", trial)
 }
 
 fn program(target: &std::path::Path, profile: &str, name: &str) -> String {
