@@ -18,7 +18,7 @@ use muslip_control::emulation::FromFirmware;
 use muslip_record::{End, PostMortem, State};
 
 use crate::dump::dump;
-use crate::post_mortem::{WORDS, packed, unpacked};
+use crate::post_mortem::{WORDS, packed, state_of, unpacked};
 use crate::stack::GUARD_BYTES;
 use crate::{emulator, totals};
 
@@ -186,10 +186,7 @@ fn end(cause: End, [program_counter, link_register]: [u32; 2]) -> ! {
         fault_status,
         hard_fault_status,
         address,
-        state: State::ALL
-            .into_iter()
-            .find(|&other| other as u32 == state)
-            .unwrap_or(State::Fault),
+        state: state_of(state).unwrap_or(State::Fault),
         tick: totals::WORKED.load(Ordering::Relaxed),
     };
     // SAFETY: nobody reads it before the reset.

@@ -57,11 +57,15 @@ pub fn unpacked(words: &[u32; WORDS]) -> Option<PostMortem> {
         fault_status,
         hard_fault_status,
         address,
-        state: State::ALL
-            .into_iter()
-            .find(|&other| other as u32 == state)?,
+        state: state_of(state)?,
         tick,
     })
+}
+
+/// The state that is kept as this number.
+#[must_use]
+pub fn state_of(number: u32) -> Option<State> {
+    State::ALL.into_iter().find(|&state| state as u32 == number)
 }
 
 /// FNV-1a over words.

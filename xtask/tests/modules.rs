@@ -9,7 +9,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use syn::visit::{self, Visit};
-use syn::{Attribute, Item, ItemUse, UseTree};
+use syn::{Attribute, Item, ItemUse, UseName, UseRename, UseTree};
 
 /// A module's path below its crate's root; the root's is empty.
 type Module = Vec<String>;
@@ -204,13 +204,8 @@ impl Finder {
                 }
             }
             UseTree::Name(name) if name.ident == "self" => self.add(above),
-            UseTree::Name(name) => {
-                above.push(name.ident.to_string());
-                self.add(above);
-                above.pop();
-            }
-            UseTree::Rename(name) => {
-                above.push(name.ident.to_string());
+            UseTree::Name(UseName { ident }) | UseTree::Rename(UseRename { ident, .. }) => {
+                above.push(ident.to_string());
                 self.add(above);
                 above.pop();
             }
