@@ -1,14 +1,9 @@
 //! Levenberg and Marquardt's method on the two-parameter law.
 //!
-//! Source: J. J. More, "The Levenberg-Marquardt algorithm: implementation and theory" (1978), as in
-//! MINPACK; the crate is a port of it. The unknowns are mup and ln sp, so that no step leaves sp > 0;
-//! the covariance is stated for mup and sp themselves.
-
-use std::cell::{Cell, RefCell};
-
-use levenberg_marquardt::{LeastSquaresProblem, LevenbergMarquardt};
-use nalgebra_lm::storage::Owned;
-use nalgebra_lm::{DVector, Dyn, Matrix, OMatrix, U2, Vector2};
+//! Source: D. W. Marquardt, "An Algorithm for Least-Squares Estimation of Nonlinear Parameters" (1963),
+//! with the damping of H. B. Nielsen, "Damping Parameter in Marquardt's Method" (IMM-REP-1999-05). The
+//! unknowns are mup and ln sp, so that no step leaves sp > 0; the covariance is stated for mup and sp
+//! themselves.
 
 /// A curve of the two-parameter law mu(s) = 2 mup s sp / (sp^2 + s^2).
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -141,26 +136,8 @@ pub fn fit_curve(
     if frictions.iter().all(|&friction| friction == 0.0) {
         return Err(FitError::Undetermined);
     }
-    let problem = Problem {
-        slips,
-        frictions,
-        unknowns: Vector2::new(start.peak_friction, start.critical_slip.ln()),
-        maximum_iterations,
-        limit_reached: Cell::new(false),
-        trajectory: RefCell::new(Vec::new()),
-    };
-    let (problem, report) = LevenbergMarquardt::new().minimize(problem);
-    let limit_reached = problem.limit_reached.get();
-    let mut trajectory = problem.trajectory.take();
-    let curve = if limit_reached {
-        trajectory.last().copied().unwrap_or(start)
-    } else {
-        problem.curve()
-    };
-    if trajectory.last() != Some(&curve) {
-        trajectory.push(curve);
-    }
-    let converged = !limit_reached && report.termination.was_successful();
+    let (trajectory, converged) = descend(slips, frictions, start, maximum_iterations);
+    let curve = trajectory.last().copied().unwrap_or(start);
     let usable = curve.peak_friction.is_finite()
         && curve.critical_slip.is_finite()
         && curve.critical_slip > 0.0;
@@ -244,70 +221,93 @@ pub fn robust_start(slips: &[f64], frictions: &[f64]) -> Curve {
     best
 }
 
-struct Problem<'a> {
-    slips: &'a [f64],
-    frictions: &'a [f64],
-    /// (mup, ln sp)
-    unknowns: Vector2<f64>,
+/// Sum of squared residuals at a curve, and with respect to (mup, ln sp) the normal matrix J'J as
+/// (11, 12, 22) and the gradient J'r.
+struct Squares {
+    sum: f64,
+    normal: (f64, f64, f64),
+    gradient: (f64, f64),
+}
+
+impl Squares {
+    fn at(curve: Curve, slips: &[f64], frictions: &[f64]) -> Self {
+        let mut squares = Self {
+            sum: 0.0,
+            normal: (0.0, 0.0, 0.0),
+            gradient: (0.0, 0.0),
+        };
+        for (&slip, &friction) in slips.iter().zip(frictions) {
+            let (by_peak, by_slip) = curve.gradient(slip);
+            // d/d(ln sp) = sp d/d(sp)
+            let by_log_slip = curve.critical_slip * by_slip;
+            let residual = friction - curve.peak_friction * by_peak;
+            squares.sum += residual * residual;
+            squares.normal.0 += by_peak * by_peak;
+            squares.normal.1 += by_peak * by_log_slip;
+            squares.normal.2 += by_log_slip * by_log_slip;
+            squares.gradient.0 += by_peak * residual;
+            squares.gradient.1 += by_log_slip * residual;
+        }
+        squares
+    }
+
+    /// The step of (mup, ln sp) that solves (J'J + damping diag(J'J)) step = J'r, and by how much it
+    /// lowers the sum if residuals are straight lines.
+    fn step(&self, damping: f64) -> ((f64, f64), f64) {
+        let ((n11, n12, n22), (g1, g2)) = (self.normal, self.gradient);
+        let (d1, d2) = (damping * n11, damping * n22);
+        let determinant = (n11 + d1) * (n22 + d2) - n12 * n12;
+        let by_peak = ((n22 + d2) * g1 - n12 * g2) / determinant;
+        let by_log_slip = ((n11 + d1) * g2 - n12 * g1) / determinant;
+        let gain = by_peak * (d1 * by_peak + g1) + by_log_slip * (d2 * by_log_slip + g2);
+        ((by_peak, by_log_slip), gain)
+    }
+}
+
+/// The start and the curve after every accepted step, and whether the last is a minimum as far as f64
+/// can tell.
+fn descend(
+    slips: &[f64],
+    frictions: &[f64],
+    start: Curve,
     maximum_iterations: usize,
-    limit_reached: Cell<bool>,
-    trajectory: RefCell<Vec<Curve>>,
-}
-
-impl Problem<'_> {
-    fn curve(&self) -> Curve {
-        Curve {
-            peak_friction: self.unknowns.x,
-            critical_slip: self.unknowns.y.exp(),
+) -> (Vec<Curve>, bool) {
+    // What MINPACK takes: a sum that would fall by less than this part, twice over, is at its least.
+    const LEAST_GAIN: f64 = 30.0 * f64::EPSILON;
+    // From this damping on a step is below the rounding of the curve.
+    const LARGEST_DAMPING: f64 = 1e16;
+    let (mut damping, mut growth) = (1e-3, 2.0);
+    let mut trajectory = vec![start];
+    let mut curve = start;
+    let mut squares = Squares::at(curve, slips, frictions);
+    loop {
+        let ((by_peak, by_log_slip), expected) = squares.step(damping);
+        // At zero residuals nothing is left to expect; undetermined points have no step.
+        let worth_it = expected > LEAST_GAIN * squares.sum;
+        if !worth_it {
+            return (trajectory, expected.is_finite());
         }
-    }
-}
-
-impl LeastSquaresProblem<f64, Dyn, U2> for Problem<'_> {
-    type ParameterStorage = Owned<f64, U2>;
-    type ResidualStorage = Owned<f64, Dyn>;
-    type JacobianStorage = Owned<f64, Dyn, U2>;
-
-    fn set_params(&mut self, unknowns: &Vector2<f64>) {
-        self.unknowns = *unknowns;
-    }
-
-    fn params(&self) -> Vector2<f64> {
-        self.unknowns
-    }
-
-    fn residuals(&self) -> Option<DVector<f64>> {
-        let curve = self.curve();
-        Some(DVector::from_iterator(
-            self.slips.len(),
-            self.slips
-                .iter()
-                .zip(self.frictions)
-                .map(|(&slip, &friction)| curve.friction(slip) - friction),
-        ))
-    }
-
-    /// Called once at the start and once after every accepted step.
-    fn jacobian(&self) -> Option<OMatrix<f64, Dyn, U2>> {
-        let curve = self.curve();
-        let mut trajectory = self.trajectory.borrow_mut();
-        trajectory.push(curve);
-        if trajectory.len() > self.maximum_iterations {
-            self.limit_reached.set(true);
-            return None;
+        if trajectory.len() > maximum_iterations {
+            return (trajectory, false);
         }
-        let sp = curve.critical_slip;
-        let by_peak = self.slips.iter().map(|&slip| unit_friction(slip, sp));
-        // d/d(ln sp) = sp d/d(sp)
-        let by_log_slip = self
-            .slips
-            .iter()
-            .map(|&slip| sp * curve.peak_friction * unit_slope(slip, sp));
-        Some(Matrix::from_iterator_generic(
-            Dyn(self.slips.len()),
-            U2,
-            by_peak.chain(by_log_slip),
-        ))
+        let next = Curve {
+            peak_friction: curve.peak_friction + by_peak,
+            critical_slip: curve.critical_slip * by_log_slip.exp(),
+        };
+        let at_next = Squares::at(next, slips, frictions);
+        let gained = (squares.sum - at_next.sum) / expected;
+        if gained > 0.0 {
+            damping *= (1.0 - (2.0 * gained - 1.0).powi(3)).max(1.0 / 3.0);
+            growth = 2.0;
+            (curve, squares) = (next, at_next);
+            trajectory.push(curve);
+        } else {
+            damping *= growth;
+            growth *= 2.0;
+            if damping > LARGEST_DAMPING {
+                return (trajectory, true);
+            }
+        }
     }
 }
 
