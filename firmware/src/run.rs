@@ -13,7 +13,7 @@ use stm32f4::stm32f405::USART1;
 
 use crate::board::{AnyActuators, AnySensors, Started};
 use crate::cell::InterruptCell;
-use crate::counter::{Most, cycles};
+use crate::counter::{Interrupter, Most, Stopwatch, cycles, keep};
 use crate::emulator::{self, Took};
 use crate::queue::{self, Sender, Taker};
 use crate::settings::CYCLES_PER_SAMPLE;
@@ -28,7 +28,7 @@ const SAMPLES_PER_STACK_CHECK: u32 = 64;
 
 /// True while the main loop works on a sample.
 static WORKING: AtomicBool = AtomicBool::new(false);
-/// Cycles of the last sampling interrupt, and the most of any.
+/// Cycles of the last sampling interrupt without those of the link in it, and the most of any.
 static INTERRUPT: AtomicU32 = AtomicU32::new(0);
 static WORST_INTERRUPT: Most = Most::new();
 /// Most cycles for which every interrupt was masked.
@@ -44,7 +44,7 @@ static SAMPLER: InterruptCell<Sampler> = InterruptCell::new();
 /// The sampling interrupt, 1,000 times a second by the timer or once for each frame of the emulator.
 #[exception]
 fn SysTick() {
-    let start = cycles();
+    let watch = Stopwatch::start();
     #[allow(unsafe_code, reason = "what the sampling interrupt owns")]
     // SAFETY: only this interrupt calls it.
     let sampler = unsafe { SAMPLER.get() };
@@ -62,7 +62,8 @@ fn SysTick() {
     }
     // Full is late by more than a sample; the brake is dumped already.
     sampler.samples.push(raw);
-    let took = cycles().wrapping_sub(start);
+    let took = watch.own();
+    keep(Interrupter::Sampling, took);
     INTERRUPT.store(took, Ordering::Relaxed);
     WORST_INTERRUPT.take(took);
 }
@@ -158,7 +159,7 @@ impl Loop {
     fn work(&mut self, raw: &RawSample) {
         WORKING.store(true, Ordering::Relaxed);
         emulator::await_link();
-        let start = cycles();
+        let watch = Stopwatch::start();
         let output = self.controller.control(raw);
         // What the interrupt has dumped stays dumped until the controller itself says so; between the look and
         // the valves it must not come.
@@ -170,7 +171,7 @@ impl Loop {
             };
             self.actuators.actuate(output);
         });
-        let control = cycles().wrapping_sub(start);
+        let control = watch.own();
         emulator::burn();
         self.controller.set_overrun_bytes(uart::overrun_bytes());
         self.controller.set_resources(self.resources);
@@ -180,16 +181,18 @@ impl Loop {
         } = &mut self.link;
         self.controller
             .communicate(|| receiver.receive(), transmitter, &mut self.actuators);
-        let step = cycles().wrapping_sub(start);
+        let step = watch.own();
+        let elapsed = watch.elapsed();
         self.actuators.feed_watchdog();
         WORKING.store(false, Ordering::Relaxed);
         count(&WORKED);
-        self.account(control, step);
+        self.account(control, step, elapsed);
     }
 
-    fn account(&mut self, control: u32, step: u32) {
+    /// What a sample's work took by itself up to the valves, and in all; and in all by the clock.
+    fn account(&mut self, control: u32, step: u32, elapsed: u32) {
         let interrupt = INTERRUPT.load(Ordering::Relaxed);
-        if step.saturating_add(interrupt) > CYCLES_PER_SAMPLE {
+        if elapsed.saturating_add(interrupt) > CYCLES_PER_SAMPLE {
             self.controller.overran();
         }
         let worked = WORKED.load(Ordering::Relaxed);

@@ -12,7 +12,7 @@ use stm32f4::stm32f405::{Interrupt, NVIC, RCC, USART1, USART2, interrupt};
 
 use crate::bits::low_u8;
 use crate::cell::InterruptCell;
-use crate::counter::{Most, cycles};
+use crate::counter::{Interrupter, Most, cycles, keep};
 use crate::queue::{self, Sender, Taker};
 use crate::settings::{APB1_HZ, APB2_HZ, HSI_HZ, LOG_BAUD, baud_divisor};
 use crate::totals::add;
@@ -199,7 +199,9 @@ fn USART2() {
         return;
     };
     let moved = (line.take(), line.send());
+    // Nothing but the ends of the program goes before it.
     let took = cycles().wrapping_sub(start);
+    keep(Interrupter::Link, took);
     // The chip moves one byte a direction in a run; the emulator, which has many ready, would only tell how many.
     match moved {
         (1, 0 | 1) => TAKING.take(took),
