@@ -126,7 +126,11 @@ fn after_ten_thousand_samples_it_is_where_the_batch_fit_is() {
 
 #[test]
 fn its_memory_is_fixed_and_small() {
-    assert!(size_of::<EfficientFilter<f32>>() <= 512);
+    assert!(
+        size_of::<EfficientFilter<f32>>() <= 512,
+        "{}",
+        size_of::<EfficientFilter<f32>>()
+    );
 }
 
 #[test]

@@ -88,6 +88,15 @@ impl<T: Real> Bins<T> {
         self.occupied |= 1 << term.index;
     }
 
+    /// Empties a bin.
+    pub(super) fn empty(&mut self, index: usize) {
+        if let Some(bin) = self.bins.get_mut(index) {
+            *bin = Bin::EMPTY;
+            self.occupied &= !(1 << index);
+            self.left_out &= !(1 << index);
+        }
+    }
+
     /// All weights times one factor, all counts times another.
     pub(super) fn scale(&mut self, weight: T, count: T) {
         for bin in &mut self.bins {

@@ -2,6 +2,7 @@
 
 use super::bins::Bins;
 use super::config::Config;
+use super::dissent::Dissent;
 use super::sums::Sums;
 use crate::filter::mu_slip::{Covariance, State};
 use crate::real::Real;
@@ -20,7 +21,7 @@ pub(super) const SUSPECT: f64 = 6.25;
 const FAR: f64 = 0.25;
 /// Samples before noise, prior and thresholds are taken anew for the first time; then each time they have
 /// doubled.
-pub(super) const FIRST_RENEWAL: u32 = 6;
+pub(super) const FIRST_RENEWAL: u16 = 6;
 /// Curvature in ln sp over m² Σ w sech² tanh² below which it is rounding.
 const ROUNDING: f64 = 16.0;
 /// Curvature of the likelihood in ln sp over mup² Σ w sech² (0.1 to 0.3 of a run through the peak) below
@@ -60,12 +61,12 @@ pub struct Estimate<T> {
     /// Number of samples (with forgetting: of those that still count) at the last renewal.
     pub(super) count: T,
     /// Samples taken, up to where that no longer matters.
-    pub(super) seen: u32,
+    pub(super) seen: u16,
     /// Samples until something is to be attended to, and from then until the next renewal.
-    pub(super) quiet: u32,
-    pub(super) rest: u32,
+    pub(super) quiet: u16,
+    pub(super) rest: u16,
     /// Rejections in a row.
-    pub(super) rejections: u8,
+    pub(super) dissent: Dissent<T>,
     /// Judgements that are still due, and samples since the last suspect.
     pub(super) due: u8,
     pub(super) since_suspect: u8,
@@ -76,30 +77,24 @@ pub struct Estimate<T> {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct Prior<T> {
-    /// Precision of mup, and times its mean.
+    /// Precision of mup.
     pub(super) weight: T,
-    pub(super) friction: T,
     /// Share of the information on ln sp that is believed.
     pub(super) believed: T,
-    /// Precision of ln sp over that, and times the distance of its mean from s0.
+    /// Precision of ln sp over that.
     pub(super) slip_weight: T,
-    pub(super) slip: T,
 }
 
 impl<T: Real> Prior<T> {
     const NONE: Self = Self {
         weight: T::ZERO,
-        friction: T::ZERO,
         believed: T::ONE,
         slip_weight: T::ZERO,
-        slip: T::ZERO,
     };
 
     fn scale(&mut self, factor: T) {
         self.weight *= factor;
-        self.friction *= factor;
         self.slip_weight *= factor;
-        self.slip *= factor;
     }
 }
 
@@ -146,7 +141,7 @@ impl<T: Real> Estimate<T> {
             seen: FIRST_RENEWAL,
             quiet: FIRST_RENEWAL,
             rest: 0,
-            rejections: 0,
+            dissent: Dissent::NONE,
             due: 0,
             since_suspect: 0,
         };
@@ -169,10 +164,10 @@ impl<T: Real> Estimate<T> {
     }
 
     /// The sums before any sample: what is known of mup all the same.
-    pub(super) fn prior_sums(&self) -> Sums<T> {
+    pub(super) fn prior_sums(&self, config: &Config<T>) -> Sums<T> {
         Sums {
             law: self.prior.weight,
-            friction: self.prior.friction,
+            friction: self.prior.weight * config.initial_state.peak_friction,
             ..Sums::NONE
         }
     }
@@ -223,6 +218,7 @@ impl<T: Real> Estimate<T> {
     pub(super) fn is_sound(&self) -> bool {
         self.bins.is_finite()
             && self.sums.is_finite()
+            && self.dissent.is_finite()
             && self.reference > T::ZERO
             && (self.reference
                 + self.start_log_slip
@@ -241,14 +237,12 @@ impl<T: Real> Estimate<T> {
         } = config.initial_state;
         let (square, count) = self.bins.totals();
         self.count = count;
-        let Prior {
-            weight, friction, ..
-        } = self.prior;
+        let Prior { weight, .. } = self.prior;
         let sums = &mut self.sums;
         let m = self.peak_friction;
         // What is left of Σ w z² after the straight line of `solve`.
         let slope = m * self.shift;
-        let (law, friction) = (sums.law - weight, sums.friction - friction);
+        let (law, friction) = (sums.law - weight, sums.friction - weight * start);
         let residual = square
             - m * (friction + friction - m * law)
             - slope
@@ -280,17 +274,22 @@ impl<T: Real> Estimate<T> {
         let slip_weight = T::from_f64(PRIOR_PRECISION) * noise * (share * share) / believed;
         self.prior = Prior {
             weight,
-            friction: weight * start,
             believed,
             slip_weight,
-            slip: slip_weight * self.start_log_slip,
         };
         self.far = T::from_f64(FAR) * noise / (believed * (curvature + slip_weight));
+        self.watch(config);
+    }
+
+    /// From where on a sample is looked at closely.
+    pub(super) fn watch(&mut self, config: &Config<T>) {
         self.suspect_level = match (config.nis_gate, config.memory) {
             (None, None) => T::ONE / T::MIN_POSITIVE,
             // With forgetting each sample is looked at closely: there the forgetting is done.
             (_, Some(_)) => -T::ONE,
-            _ => T::from_f64(SUSPECT) * factor.min(T::from_f64(LARGEST_USUAL_FACTOR)),
+            // And so is each that may end a run of rejections.
+            _ if !self.dissent.is_none() => -T::ONE,
+            _ => T::from_f64(SUSPECT) * self.noise_factor.min(T::from_f64(LARGEST_USUAL_FACTOR)),
         };
     }
 

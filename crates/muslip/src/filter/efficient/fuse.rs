@@ -26,13 +26,11 @@ const DOUBTFUL_FACTOR: f64 = 2.5;
 /// The same ratio from which outliers are taken as certain: the noise is declared to ±50 %.
 const CONTAMINATED_FACTOR: f64 = 5.0;
 /// Most samples between two renewals.
-const MOST_SAMPLES_BETWEEN: u32 = 8192;
+const MOST_SAMPLES_BETWEEN: u16 = 8192;
 /// Noise variance over the start's mup squared below which a weight of one does not go.
 const LEAST_UNIT: f64 = 1e-6;
 /// Times that the bins are judged for one suspect, at most.
 const ROUNDS: u8 = 3;
-/// Most measurements in a row that the gate rejects.
-const MOST_REJECTIONS: u8 = 3;
 /// Samples without a new suspect before the bins are judged.
 const PATIENCE: u8 = 5;
 
@@ -53,7 +51,6 @@ impl<T: Real> Estimate<T> {
         if squared > self.suspect_level * variance {
             return self.look_closely(config, slip, friction, variance);
         }
-        self.rejections = 0;
         self.take(config, &term);
         Decision::Accepted
     }
@@ -91,7 +88,7 @@ impl<T: Real> Estimate<T> {
         if self.quiet == 0 {
             self.attend(config);
         } else if self.shift * self.shift > self.far {
-            self.pass();
+            self.pass(config);
         }
     }
 
@@ -107,14 +104,14 @@ impl<T: Real> Estimate<T> {
             law_curvature,
             ..
         } = self.sums;
-        let prior = self.prior;
+        let slip_weight = self.prior.slip_weight;
         // Gradient and curvature in ln sp are friction G/law² and friction² K/law³; one division for all.
         let k = law * law_curvature - law_slope * law_slope;
         let g = friction_slope * law - law_slope * friction;
         let square = law * law;
-        let curvature = friction * friction * k + prior.slip_weight * (square * law);
+        let curvature = friction * friction * k + slip_weight * (square * law);
         let inverse = T::ONE / (curvature * law);
-        let shift = (friction * g + prior.slip * square) * square * inverse;
+        let shift = (friction * g + slip_weight * self.start_log_slip * square) * square * inverse;
         let by_law = curvature * inverse;
         let m = friction * by_law;
         self.shift = shift;
@@ -125,7 +122,7 @@ impl<T: Real> Estimate<T> {
     /// The sums about where sp is now, and what follows from them.
     #[cold]
     #[inline(never)]
-    fn pass(&mut self) {
+    fn pass(&mut self, config: &Config<T>) {
         let longest = T::from_f64(LONGEST_STEP);
         let step = self.shift.min(longest).max(-longest);
         let reference = moved(self.reference, step);
@@ -134,8 +131,7 @@ impl<T: Real> Estimate<T> {
             self.reference = reference;
             self.start_log_slip += -step;
         }
-        self.prior.slip = self.prior.slip_weight * self.start_log_slip;
-        self.sums = self.prior_sums();
+        self.sums = self.prior_sums(config);
         self.bins.add_about(self.reference, &mut self.sums);
         self.solve();
         self.shift = self.shift.min(longest).max(-longest);
@@ -154,7 +150,8 @@ impl<T: Real> Estimate<T> {
             self.noise_factor,
             self.unit,
         );
-        self.pass();
+        self.dissent.keep_only(self.bins.left_out);
+        self.pass(config);
         self.renew(config);
     }
 
@@ -188,7 +185,7 @@ impl<T: Real> Estimate<T> {
             self.reconsider(config);
         }
         if self.shift * self.shift > self.far {
-            self.pass();
+            self.pass(config);
         }
         (self.quiet, self.rest) = if self.due > 0 {
             (1, next - 1)
@@ -219,26 +216,35 @@ impl<T: Real> Estimate<T> {
             let believed = self.noise_factor.min(T::from_f64(LARGEST_GATE_FACTOR));
             let noise = believed * variance * (T::ONE + T::from_f64(UNLEARNT_NOISE) / degrees);
             if suspect && squared > gate * (expected.signal + noise) {
-                if self.rejections < MOST_REJECTIONS {
-                    self.rejections += 1;
+                let seen = (self.seen, config.memory.is_some());
+                let reading = [expected.by_peak_friction, friction];
+                let known = [self.peak_friction, expected.noise];
+                if !self.dissent.take(seen, reading, known) {
                     if in_bin <= T::ZERO && config.memory.is_none() {
                         // Alone in its bin it costs nothing to keep it in mind.
                         self.bins.add(&term);
                         self.bins.left_out |= 1 << term.index;
+                        self.dissent.keep(term.index);
                         self.doubt();
                     }
+                    self.watch(config);
                     return Decision::Rejected;
                 }
                 if config.memory.is_some() {
                     // The curve has changed: what is known of the old one misleads.
                     self.bins = Bins::NONE;
-                    self.sums = self.prior_sums();
+                    self.dissent.keep_only(0);
+                    self.sums = self.prior_sums(config);
                     self.due = 0;
                     self.renew(config);
                     suspect = false;
                 }
-            } else {
-                self.rejections = 0;
+            } else if !self.dissent.is_none() {
+                // It has passed: those rejected before it were glitches, and one in its own bin stays no longer.
+                if self.dissent.end(term.index) {
+                    self.bins.empty(term.index);
+                }
+                self.watch(config);
             }
         }
         if let Some(memory) = config.memory {

@@ -1,0 +1,148 @@
+//! What rejected readings say to each other.
+
+use crate::real::{QUARTER_BINADES, Real};
+
+/// Readings that are rejected in a row before they may be believed for agreeing with each other.
+const LEAST: (u16, u16) = (3, 8);
+/// Readings that are rejected in a row, whatever they say.
+const MOST: (u16, u16) = (12, 64);
+/// Samples seen for each of [`LEAST`], and for each of [`MOST`].
+const SEEN_FOR: (u16, u16) = (16, 4);
+/// Sum of squares about the level, in noise variances a reading, up to which readings agree.
+const AGREEING: f64 = 2.0;
+/// What the sum would be were they off by the same amount each, or the same, from which that can be told from a level.
+const TELLING: f64 = 2.0 * AGREEING;
+/// Readings that both sums are granted more than there are.
+const FEW: f64 = 3.0;
+
+/// Readings rejected one after another, as a curve of the same slip at the peak and another peak.
+///
+/// A burst of glitches is no curve: its readings scatter, or are off by the same amount whatever the slip. Where
+/// slip stands still a burst that does not scatter cannot be told from a change of friction, but by its length.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub(super) struct Dissent<T> {
+    /// Σ sech.
+    shape: T,
+    /// Σ sech².
+    law: T,
+    /// Σ z sech.
+    friction: T,
+    /// Σ z².
+    square: T,
+    /// From the lowest: a bit for each bin that holds nothing but a rejected reading; the number of readings in a row
+    /// that failed the gate; whether they are believed all the same.
+    pending: u32,
+}
+
+const BINS: u32 = (1 << QUARTER_BINADES) - 1;
+const READING: u32 = 1 << QUARTER_BINADES;
+const OPEN: u32 = 1 << 31;
+// 65 readings at most.
+const _: () = assert!(QUARTER_BINADES + 7 <= 31);
+
+impl<T: Real> Dissent<T> {
+    pub(super) const NONE: Self = Self {
+        shape: T::ZERO,
+        law: T::ZERO,
+        friction: T::ZERO,
+        square: T::ZERO,
+        pending: 0,
+    };
+
+    /// Whether nothing was rejected that a reading which passes the gate has to end.
+    #[inline]
+    pub(super) fn is_none(&self) -> bool {
+        self.pending == 0
+    }
+
+    /// Keeps in mind that a bin holds nothing but a rejected reading.
+    pub(super) fn keep(&mut self, index: usize) {
+        self.pending |= 1 << index & BINS;
+    }
+
+    /// Forgets bins that are not left out any more.
+    pub(super) fn keep_only(&mut self, left_out: u32) {
+        self.pending &= left_out | !BINS;
+    }
+
+    /// A reading has passed the gate; whether its bin holds nothing but one that did not.
+    pub(super) fn end(&mut self, index: usize) -> bool {
+        let bin = 1 << index & BINS;
+        let held = self.pending & bin != 0;
+        *self = Self {
+            pending: self.pending & BINS & !bin,
+            ..Self::NONE
+        };
+        held
+    }
+
+    pub(super) fn is_finite(&self) -> bool {
+        // A sum is finite only if each term is.
+        (self.shape + self.law + self.friction + self.square).is_finite()
+    }
+
+    /// Takes a reading that failed the gate; whether it is to be believed all the same.
+    ///
+    /// `sech` is the law's at its slip, `noise` the variance that it has, `seen` the number of samples so far.
+    pub(super) fn take(
+        &mut self,
+        (seen, forgets): (u16, bool),
+        [sech, friction]: [T; 2],
+        [peak_friction, noise]: [T; 2],
+    ) -> bool {
+        if self.pending & OPEN != 0 {
+            return true;
+        }
+        self.shape += sech;
+        self.law += sech * sech;
+        self.friction += sech * friction;
+        self.square += friction * friction;
+        self.pending += READING;
+        let readings = self.pending >> QUARTER_BINADES;
+        // What rests on few samples is sooner wrong. With forgetting few are all that there ever are.
+        let (least, most) = if forgets {
+            (LEAST.0, MOST.1)
+        } else {
+            (
+                (seen / SEEN_FOR.0).max(LEAST.0).min(LEAST.1),
+                (seen / SEEN_FOR.1).max(MOST.0).min(MOST.1),
+            )
+        };
+        let open = readings > u32::from(most)
+            || readings > u32::from(least) && self.agrees(peak_friction, noise, readings);
+        if open {
+            self.pending |= OPEN;
+        }
+        open
+    }
+
+    /// Whether the readings are those of one level, and of nothing else that glitches make.
+    fn agrees(&self, peak_friction: T, noise: T, readings: u32) -> bool {
+        let number = count::<T>(readings);
+        let level = self.friction / self.law;
+        let about = self.square - level * self.friction;
+        let spread = self.law - self.shape * self.shape / number;
+        let off = level - peak_friction;
+        let unit = noise * (number + T::from_f64(FEW));
+        // Off by the same amount each, or all of the same value.
+        let apart = (off * off).min(level * level) * spread;
+        level > T::ZERO
+            && about <= T::from_f64(AGREEING) * unit
+            && apart > T::from_f64(TELLING) * unit
+    }
+}
+
+/// A small number, bit by bit: the scalar is made of constants only.
+fn count<T: Real>(number: u32) -> T {
+    let (mut sum, mut place, mut left) = (T::ZERO, T::ONE, number);
+    while left != 0 {
+        if left & 1 != 0 {
+            sum += place;
+        }
+        place += place;
+        left >>= 1;
+    }
+    sum
+}
