@@ -14,10 +14,9 @@ const LIMIT: u32 = 2_000;
 /// Line of GPIOB that selects the converter.
 const SELECT_LINE: u32 = 12;
 
-/// The converter and whether it could be set up.
+/// The converter.
 pub struct Bridge {
     converter: Ads131m02<Bus>,
-    configured: bool,
 }
 
 impl Bridge {
@@ -25,25 +24,22 @@ impl Bridge {
     pub fn start(spi: SPI2) -> Self {
         set_up(&registers::BRIDGE, &mut bus::Bus);
         let mut converter = Ads131m02::new(Bus(spi));
-        let configured = converter.configure([ChannelConfig::default(); 2]).is_ok();
-        Self {
-            converter,
-            configured,
-        }
+        // Where that fails the readings are bad, and each tries on.
+        converter.configure([ChannelConfig::default(); 2]).ok();
+        Self { converter }
     }
 
     /// The converter as it is, believed to be set up.
     pub fn untouched(spi: SPI2) -> Self {
         Self {
             converter: Ads131m02::new(Bus(spi)),
-            configured: true,
         }
     }
 
     /// The newest codes.
     pub fn read(&mut self) -> BridgeReading {
         match self.converter.read() {
-            Ok(conversions) if self.configured => BridgeReading {
+            Ok(conversions) => BridgeReading {
                 codes: conversions.codes,
                 quality: if conversions.fresh {
                     BridgeQuality::Fresh
@@ -51,7 +47,7 @@ impl Bridge {
                     BridgeQuality::Stale
                 },
             },
-            _ => BridgeReading {
+            Err(_) => BridgeReading {
                 codes: [0; 2],
                 quality: BridgeQuality::Bad,
             },
