@@ -5,15 +5,18 @@ use crate::real::{QUARTER_BINADES, Real};
 /// Readings that are rejected in a row before they may be believed for agreeing with each other.
 const LEAST: (u16, u16) = (3, 8);
 /// Readings that are rejected in a row, whatever they say.
-const MOST: (u16, u16) = (12, 64);
+const MOST: (u16, u16) = (3, 64);
 /// Samples seen for each of [`LEAST`], and for each of [`MOST`].
-const SEEN_FOR: (u16, u16) = (16, 4);
+const SEEN_FOR: (u16, u16) = (16, 8);
+/// The same with forgetting, as a share of the memory: what is longer is no burst to it.
+const SHARE_OF_MEMORY: f64 = 0.07;
 /// Sum of squares about the level, in noise variances a reading, up to which readings agree.
 const AGREEING: f64 = 2.0;
-/// What the sum would be were they off by the same amount each, or the same, from which that can be told from a level.
-const TELLING: f64 = 2.0 * AGREEING;
-/// Readings that both sums are granted more than there are.
+/// Readings that the sum is granted more than there are.
 const FEW: f64 = 3.0;
+/// What the sum would be at least were they off by the same amount each, or the same, over what it is, and in noise
+/// variances beyond that, from which a level can be told from either.
+const TELLING: (f64, f64) = (1.5, 40.0);
 
 /// Readings rejected one after another, as a curve of the same slip at the peak and another peak.
 ///
@@ -39,8 +42,9 @@ pub(super) struct Dissent<T> {
 const BINS: u32 = (1 << QUARTER_BINADES) - 1;
 const READING: u32 = 1 << QUARTER_BINADES;
 const OPEN: u32 = 1 << 31;
-// 65 readings at most.
 const _: () = assert!(QUARTER_BINADES + 7 <= 31);
+/// More than enough to be open.
+const MOST_COUNTED: u32 = 100;
 
 impl<T: Real> Dissent<T> {
     pub(super) const NONE: Self = Self {
@@ -88,39 +92,68 @@ impl<T: Real> Dissent<T> {
     /// `sech` is the law's at its slip, `noise` the variance that it has, `seen` the number of samples so far.
     pub(super) fn take(
         &mut self,
-        (seen, forgets): (u16, bool),
+        (seen, memory): (u16, Option<T>),
         [sech, friction]: [T; 2],
         [peak_friction, noise]: [T; 2],
     ) -> bool {
         if self.pending & OPEN != 0 {
             return true;
         }
-        self.shape += sech;
-        self.law += sech * sech;
-        self.friction += sech * friction;
-        self.square += friction * friction;
-        self.pending += READING;
-        let readings = self.pending >> QUARTER_BINADES;
-        // What rests on few samples is sooner wrong. With forgetting few are all that there ever are.
-        let (least, most) = if forgets {
-            (LEAST.0, MOST.1)
-        } else {
-            (
-                (seen / SEEN_FOR.0).max(LEAST.0).min(LEAST.1),
-                (seen / SEEN_FOR.1).max(MOST.0).min(MOST.1),
-            )
+        self.add(sech, friction);
+        let readings = self.readings();
+        // What rests on few samples is sooner wrong.
+        let (least, over) = match memory {
+            Some(memory) => {
+                let most = (memory * T::from_f64(SHARE_OF_MEMORY))
+                    .max(T::from_f64(f64::from(MOST.0)))
+                    .min(T::from_f64(f64::from(MOST.1)));
+                (LEAST.0, count::<T>(readings) > most)
+            }
+            None => {
+                let most = (seen / SEEN_FOR.1).max(MOST.0).min(MOST.1);
+                let least = (seen / SEEN_FOR.0).max(LEAST.0).min(LEAST.1);
+                (least, readings > u32::from(most))
+            }
         };
-        let open = readings > u32::from(most)
-            || readings > u32::from(least) && self.agrees(peak_friction, noise, readings);
+        let open =
+            over || readings > u32::from(least) && self.agrees(peak_friction, noise, readings);
         if open {
             self.pending |= OPEN;
         }
         open
     }
 
+    fn readings(&self) -> u32 {
+        (self.pending & !OPEN) >> QUARTER_BINADES
+    }
+
+    fn add(&mut self, sech: T, friction: T) {
+        self.shape += sech;
+        self.law += sech * sech;
+        self.friction += sech * friction;
+        self.square += friction * friction;
+        self.pending += READING;
+    }
+
+    /// Takes a reading that passed the gate, and would have passed one about what was rejected as well: slip so small
+    /// that it does not tell which is right. Whether it is such a one.
+    pub(super) fn is_undecided(&mut self, [sech, friction]: [T; 2], tolerated: T) -> bool {
+        let readings = self.readings();
+        if readings == 0 || readings >= MOST_COUNTED || self.pending & OPEN != 0 {
+            return false;
+        }
+        let off = friction - self.friction / self.law * sech;
+        let undecided = off * off <= tolerated;
+        if undecided {
+            self.add(sech, friction);
+        }
+        undecided
+    }
+
     /// Whether the readings are those of one level, and of nothing else that glitches make.
     fn agrees(&self, peak_friction: T, noise: T, readings: u32) -> bool {
         let number = count::<T>(readings);
+        let (share, beyond) = TELLING;
         let level = self.friction / self.law;
         let about = self.square - level * self.friction;
         let spread = self.law - self.shape * self.shape / number;
@@ -130,7 +163,7 @@ impl<T: Real> Dissent<T> {
         let apart = (off * off).min(level * level) * spread;
         level > T::ZERO
             && about <= T::from_f64(AGREEING) * unit
-            && apart > T::from_f64(TELLING) * unit
+            && apart > T::from_f64(share) * about + T::from_f64(beyond) * noise
     }
 }
 

@@ -216,7 +216,7 @@ impl<T: Real> Estimate<T> {
             let believed = self.noise_factor.min(T::from_f64(LARGEST_GATE_FACTOR));
             let noise = believed * variance * (T::ONE + T::from_f64(UNLEARNT_NOISE) / degrees);
             if suspect && squared > gate * (expected.signal + noise) {
-                let seen = (self.seen, config.memory.is_some());
+                let seen = (self.seen, config.memory);
                 let reading = [expected.by_peak_friction, friction];
                 let known = [self.peak_friction, expected.noise];
                 if !self.dissent.take(seen, reading, known) {
@@ -239,7 +239,12 @@ impl<T: Real> Estimate<T> {
                     self.renew(config);
                     suspect = false;
                 }
-            } else if !self.dissent.is_none() {
+            } else if !self.dissent.is_none()
+                && !self.dissent.is_undecided(
+                    [expected.by_peak_friction, friction],
+                    T::from_f64(SUSPECT) * expected.noise,
+                )
+            {
                 // It has passed: those rejected before it were glitches, and one in its own bin stays no longer.
                 if self.dissent.end(term.index) {
                     self.bins.empty(term.index);

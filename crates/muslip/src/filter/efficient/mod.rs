@@ -22,7 +22,7 @@
 //! |---|---|
 //! | noise | only its ratio between samples is believed; the level is learnt from the residual sum of squares, the declared one counting as half a sample |
 //! | prior | peak friction N(start, start²); ln sp N(start, ½), faded as 1/(1 + information)² once samples speak |
-//! | outliers | beyond the gate a measurement is rejected, and so is a burst of them: three to eight in a row at least, then until they agree on another peak, 12 to 64 at most. Where the residuals are larger than the noise can be, each quarter with few samples is judged by itself against the median of all: it may be left out, and taken in again |
+//! | outliers | beyond the gate a measurement is rejected, and so is a burst of them: three to eight in a row at least, then until they agree on another peak, 64 at most (an eighth of the samples so far, 7 % of the memory). Where the residuals are larger than the noise can be, each quarter with few samples is judged by itself against the median of all: it may be left out, and taken in again |
 //! | tracking | [`Config::memory`] samples, exponentially forgotten; measurements in a row beyond the gate that are believed in the end start the sums anew |
 //! | slip noise | not modelled: it lowers the estimate of the peak as it does that of any fit that takes slip as known |
 //!
