@@ -4,6 +4,8 @@ use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 
 use stm32f4::stm32f405::{GPIOB, TIM1};
 
+use crate::registers::BREAK;
+
 /// Line of GPIOB that holds pressure while it is high.
 pub const DUMP_LINE: u32 = 0;
 
@@ -16,11 +18,13 @@ pub static EMULATED_PINS: AtomicU32 = AtomicU32::new(0);
 pub fn dump() {
     DUMPED.store(true, Ordering::Relaxed);
     #[allow(unsafe_code, reason = "raw register values")]
-    // SAFETY: BSRR and CCR1 are written whole; no other context's read-modify-write can undo it.
+    // SAFETY: BSRR, BDTR and CCR1 are written whole; no other context's read-modify-write can undo it. Without MOE
+    // the valve is off at once, not from the PWM's next period on.
     unsafe {
         (*GPIOB::ptr())
             .bsrr()
             .write(|w| w.bits(1 << (DUMP_LINE + 16)));
+        (*TIM1::ptr()).bdtr().write(|w| w.bits(BREAK));
         (*TIM1::ptr()).ccr1().write(|w| w.bits(0));
     }
     EMULATED_PINS.store(0, Ordering::Relaxed);

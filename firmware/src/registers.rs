@@ -74,6 +74,8 @@ enum Mode {
     Alternate(u32),
     /// Alternate function with pull-up, for open-collector sensors.
     AlternatePulledUp(u32),
+    /// Alternate function with pull-down, for a line whose loss must read low.
+    AlternatePulledDown(u32),
     /// Analogue.
     Analog,
 }
@@ -85,6 +87,7 @@ const fn pin(port: u32, line: u32, mode: Mode) -> [Setting; 4] {
         Mode::Output => (0b01, 0b00, 0),
         Mode::Alternate(function) => (0b10, 0b00, function),
         Mode::AlternatePulledUp(function) => (0b10, 0b01, function),
+        Mode::AlternatePulledDown(function) => (0b10, 0b10, function),
         Mode::Analog => (0b11, 0b00, 0),
     };
     let [pulls, speeds, low, high, modes] = match port {
@@ -132,7 +135,7 @@ pub const PORTS: [Setting; 1] = [set("RCC_AHB1ENR", RCC + 0x30, 0b111, 0b111)];
 pub const DUMP_PIN: [Setting; 4] = pin(GPIOB, 0, Mode::Output);
 
 /// All other pins; docs/rig.md has the same table with its wires.
-pub const PINS: [[Setting; 4]; 18] = [
+pub const PINS: [[Setting; 4]; 21] = [
     // Wheel encoder: A to TIM3_CH1 and TIM5_CH1, B to TIM3_CH2.
     pin(GPIOC, 6, Mode::AlternatePulledUp(2)),
     pin(GPIOC, 7, Mode::AlternatePulledUp(2)),
@@ -154,13 +157,23 @@ pub const PINS: [[Setting; 4]; 18] = [
     // Valve, emergency stop, supply.
     pin(GPIOA, 8, Mode::Alternate(1)),
     pin(GPIOB, 1, Mode::InputPulledDown),
+    // The emergency stop's other channel, and the first once more as TIM1's break; the button that confirms.
+    pin(GPIOC, 4, Mode::InputPulledDown),
+    pin(GPIOA, 6, Mode::AlternatePulledDown(1)),
+    pin(GPIOB, 10, Mode::InputPulledDown),
     pin(GPIOC, 0, Mode::Analog),
     // The dump valve's once more, last of all.
     DUMP_PIN,
 ];
 
+/// MOE, of TIM1_BDTR: outputs are driven; a break clears it without any program (17.3.12).
+pub const OUTPUTS_ON: u32 = 1 << 15;
+/// The rest of TIM1_BDTR (17.4.18): BKE, break at a low level; OSSI, outputs low and not floating meanwhile; no AOE, they
+/// stay off until the program drives them again; LOCK level 1, so that no later write undoes this.
+pub const BREAK: u32 = 1 << 12 | 1 << 10 | 0b01 << 8;
+
 /// The proportional valve on TIM1's channel 1: PWM mode 1 at no duty (17.4).
-pub const VALVE: [Setting; 9] = [
+pub const VALVE: [Setting; 10] = [
     set("RCC_APB2ENR", RCC + 0x44, 1, 1),
     set("TIM1_PSC", TIM1 + 0x28, ALL_16, VALVE_PWM_PRESCALER - 1),
     set("TIM1_ARR", TIM1 + 0x2C, ALL_16, VALVE_PWM_PERIOD - 1),
@@ -172,8 +185,12 @@ pub const VALVE: [Setting; 9] = [
     // OC1M = 110, OC1PE: the duty changes at the end of a period.
     set("TIM1_CCMR1", TIM1 + 0x18, ALL_16, 0b110 << 4 | 1 << 3),
     set("TIM1_CCER", TIM1 + 0x20, ALL_16, 1),
-    // MOE.
-    set("TIM1_BDTR", TIM1 + 0x44, ALL_16, 1 << 15),
+    set("TIM1_BDTR", TIM1 + 0x44, ALL_16 & !OUTPUTS_ON, BREAK),
+    Setting {
+        // While the emergency stop is open the chip keeps it off.
+        stays: false,
+        ..set("TIM1_BDTR", TIM1 + 0x44, OUTPUTS_ON, OUTPUTS_ON)
+    },
     Setting {
         stays: false,
         ..set("TIM1_EGR", TIM1 + 0x14, ALL_16, 1)

@@ -55,8 +55,12 @@ pub struct RawSample {
     pub bridge: BridgeReading,
     /// Supply of the valves in mV.
     pub supply_mv: u16,
-    /// True where the emergency stop's loop is open.
-    pub emergency_stop: bool,
+    /// True where a channel of the emergency stop is open.
+    pub emergency_stop: [bool; 2],
+    /// The dump valve's output as it is at the pin: true holds pressure.
+    pub holds: bool,
+    /// The button at the rig that confirms a fault is pressed.
+    pub confirm: bool,
     /// True where the sample before this one was not taken from the queue in time.
     pub late: bool,
 }

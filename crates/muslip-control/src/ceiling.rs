@@ -111,8 +111,15 @@ pub const WHEEL_CHANGE_RAD_S2: Ceiling = ceiling(
     WHEEL_SENSOR,
 );
 
+/// Energy that the brake bears.
+pub const BRAKE_ENERGY_J: Ceiling =
+    ceiling("brake_heat.maximum_energy_j", (1e3, 1e8), "J", "BrakeHot");
+/// Time in which the brake cools.
+pub const COOLING_TIME_S: Ceiling =
+    ceiling("brake_heat.cooling_time_s", (1.0, 3_600.0), "s", "BrakeHot");
+
 /// All of them.
-pub const CEILINGS: [Ceiling; 11] = [
+pub const CEILINGS: [Ceiling; 13] = [
     EFFECTIVE_RADIUS_M,
     INERTIA_KG_M2,
     VEHICLE_ENCODER_RADIUS_M,
@@ -124,4 +131,6 @@ pub const CEILINGS: [Ceiling; 11] = [
     MAXIMUM_FORCE_N,
     MINIMUM_SUPPLY_V,
     WHEEL_CHANGE_RAD_S2,
+    BRAKE_ENERGY_J,
+    COOLING_TIME_S,
 ];

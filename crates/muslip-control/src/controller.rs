@@ -13,6 +13,7 @@ use crate::conversion::{Conversion, Converted, Tare};
 use crate::estimation::Estimation;
 use crate::interlock::{Circumstances, FaultSet, Interlocks};
 use crate::link::{Arrival, Link, Transmit, Urgency};
+use crate::number::whole_u32;
 use crate::sequence::{Observed, Sequence};
 use crate::slip_hold::{Refused, SlipHold};
 use crate::validate;
@@ -80,6 +81,11 @@ pub struct Controller {
     stop: bool,
     overran: bool,
     watchdog_reset: bool,
+    /// Share of full torque demanded on the last sample.
+    demand: f32,
+    /// The button at the rig was pressed at the last sample, and has been since the fault.
+    pressed: bool,
+    confirmed: bool,
 }
 
 impl Controller {
@@ -114,6 +120,10 @@ impl Controller {
             stop: false,
             overran: false,
             watchdog_reset: identity.watchdog_reset,
+            demand: 0.0,
+            // Pressed all the time is no word of anybody.
+            pressed: true,
+            confirmed: false,
         })
     }
 
@@ -162,6 +172,7 @@ impl Controller {
             slow_clock: self.identity.slow_clock,
             set_up_failed: !self.identity.set_up,
             timed_out: self.sequence.timed_out(),
+            demand: self.demand,
         };
         self.standing = self.interlocks.check(raw, &converted, &circumstances);
         let before = self.sequence.state();
@@ -171,6 +182,9 @@ impl Controller {
             self.sequence.fail(fault);
             self.event(Event::Fault(fault));
         }
+        let held = core::mem::replace(&mut self.pressed, raw.confirm);
+        let pressed = raw.confirm && !held;
+        self.confirmed = self.sequence.state() == State::Fault && (self.confirmed || pressed);
 
         let point = self.estimation.observe(&converted.sample);
         let observed = Observed {
@@ -204,6 +218,8 @@ impl Controller {
         }
 
         let output = BrakeOutput::for_demand(demand, &self.parameters.brake);
+        // What is not above 0 dumps.
+        self.demand = if demand > 0.0 { demand.min(1.0) } else { 0.0 };
         self.sample = Some(Sample {
             tick: self.tick,
             wheel_speed_rad_s: converted.sample.wheel_speed_rad_s,
@@ -328,6 +344,7 @@ impl Controller {
             worst_link_interrupt_cycles: self.resources.worst_link_interrupt_cycles,
             worst_step_cycles: self.resources.worst_step_cycles,
             stack_used_bytes: self.resources.stack_used_bytes,
+            brake_energy_j: whole_u32(self.interlocks.brake_energy_j()),
             parameters: self.identity.parameters,
             reset_flags: self.identity.reset_flags,
             end: self.identity.end,
@@ -348,6 +365,9 @@ impl Controller {
         }
         if let Some(fault) = standing.first() {
             return Err(Refusal::Interlock(fault));
+        }
+        if !self.interlocks.stop_is_proven() {
+            return Err(Refusal::StopUntested);
         }
         let before = self.sequence.state();
         self.sequence.arm().map_err(Refusal::WrongState)?;
@@ -381,6 +401,10 @@ impl Controller {
             .filter(|&fault| standing.contains(fault))
         {
             return Err(Refusal::Interlock(fault));
+        }
+        // With the state: in another there is nothing to confirm.
+        if self.sequence.state() == State::Fault && !self.confirmed {
+            return Err(Refusal::NotConfirmed);
         }
         let before = self.sequence.state();
         self.sequence.clear().map_err(Refusal::WrongState)?;
@@ -449,7 +473,7 @@ impl Controller {
             Estimation::new(parameters).map_err(|_| Refusal::Parameter(NOISE_FIELD))?;
         self.parameters = *parameters;
         self.conversion = Conversion::new(parameters);
-        self.interlocks = Interlocks::new(parameters);
+        self.interlocks.take(parameters);
         self.tare = None;
         self.store(actuators).map_err(|NotStored| Refusal::Storage)
     }

@@ -5,17 +5,17 @@
 //!
 //! | fault | condition |
 //! |---|---|
-//! | `EmergencyStop` | its loop is open |
+//! | `EmergencyStop` | one of its channels is open |
 //! | `WheelLocked` | wheel surface below 3 % of a vehicle speed above 5 m/s for more than 0.2 s, counted from the last pulse |
 //! | `Overspeed` | vehicle or wheel above its limit |
 //! | `WheelSensorLost` | no pulse for so long that the wheel would have slowed faster than brake and tyre can |
 //! | `WheelSensorOutOfRange` | speed changed faster than that with pulses, or is backwards |
 //! | `VehicleSensorLost`, `VehicleSensorOutOfRange` | the same of the vehicle, which cannot change by more than 30 m/s² |
 //! | `BridgeLost` | no answer, wrong checksum, or the converter reset itself |
-//! | `BridgeFrozen` | no conversion since the last sample, or both codes the same for the fifth time |
-//! | `BridgeOutOfRange` | code within 0.4 % of the end of the scale, or force beyond its limit |
+//! | `BridgeFrozen` | no conversion since the last sample, both codes the same for the fifth time, or one for the 25th |
+//! | `BridgeOutOfRange` | code within 0.4 % of the end of the scale, force beyond its limit, or its third change by more than half of that limit within 25 samples |
 //! | `NormalForceLost` | below its limit |
-//! | `LinkSilent` | no whole frame from the host for 250 ms |
+//! | `LinkSilent` | no whole frame with a number of its own from the host for 250 ms |
 //! | `EstimatorFault` | the filter refused an update or is not finite |
 //! | `DeadlineMissed` | a sample was not taken in time, or its work took longer than a sample |
 //! | `BrownOut` | supply of the valves below its limit |
@@ -23,6 +23,10 @@
 //! | `Clock` | the core does not run at its full clock; for good |
 //! | `Timeout` | a state lasted longer than it may, see [`sequence`](crate::sequence) |
 //! | `SetUp` | a register of the chip does not hold what start-up wrote to it; for good |
+//! | `StopChannels` | one channel of the emergency stop is open and the other is not, for more than 100 ms |
+//! | `DumpOutput` | the dump valve's output is not what it was told, at the second sample |
+//! | `SpeedsDisagree` | brake dumped, vehicle above 5 m/s, slip beyond ±0.05, for more than 2 s |
+//! | `BrakeHot` | Σ demand · full torque · wheel speed · dt, less what has cooled, above its limit |
 
 use muslip_record::{Fault, Parameters};
 
@@ -30,6 +34,8 @@ use crate::SAMPLE_S;
 use crate::board::{BridgeQuality, RawSample};
 use crate::conversion::Converted;
 use crate::encoder::Speed;
+use crate::sequence::ROLLING_SLIP;
+use crate::stop::EmergencyStop;
 
 /// Vehicle speed in m/s above which a locked wheel is a fault.
 pub const LOCK_SPEED_M_S: f32 = 5.0;
@@ -41,6 +47,14 @@ pub const LOCKED_SHARE: f32 = 0.03;
 pub const SILENT_SAMPLES: u32 = 250;
 /// The same pair of 24-bit codes this often is no measurement.
 pub const FROZEN_SAMPLES: u8 = 5;
+/// One channel's code the same this often.
+pub const STUCK_SAMPLES: u8 = 25;
+/// Samples within which a third jump of a force is one too many.
+pub const JUMP_SAMPLES: u8 = 25;
+/// Samples for which a freely rolling wheel may differ from the vehicle.
+pub const DISAGREEING_SAMPLES: u16 = 2_000;
+/// Samples for which the dump valve's output may be other than it was told.
+const DUMP_SAMPLES: u8 = 2;
 /// Magnitude of a code from which a channel is at the end of its scale.
 pub const LARGEST_CODE: u32 = 0x7F_8000;
 /// Change of speed in a sample that noise and the quantum of one pulse may make, in rad/s.
@@ -100,6 +114,8 @@ pub struct Circumstances {
     pub set_up_failed: bool,
     /// A state lasted too long.
     pub timed_out: bool,
+    /// Share of the brake's full torque that was demanded on the sample before.
+    pub demand: f32,
 }
 
 /// The interlocks' limits and memory.
@@ -113,7 +129,14 @@ pub struct Interlocks {
     last_wheel_rad_s: f32,
     last_vehicle_rad_s: f32,
     last_codes: [i32; 2],
-    repeats: u8,
+    /// How often each channel's code has been the same.
+    repeats: [u8; 2],
+    last_forces_n: [f32; 2],
+    jumps: u8,
+    disagreeing: u16,
+    dump_wrong: u8,
+    stop: EmergencyStop,
+    brake_energy_j: f32,
 }
 
 impl Interlocks {
@@ -127,8 +150,34 @@ impl Interlocks {
             last_wheel_rad_s: 0.0,
             last_vehicle_rad_s: 0.0,
             last_codes: [i32::MIN; 2],
-            repeats: 0,
+            repeats: [0; 2],
+            last_forces_n: [0.0; 2],
+            // The first forces come out of nothing.
+            jumps: 0,
+            disagreeing: 0,
+            dump_wrong: 0,
+            stop: EmergencyStop::default(),
+            brake_energy_j: 0.0,
         }
+    }
+
+    /// With other parameters' limits; the brake is as hot and the emergency stop as proven as before.
+    pub fn take(&mut self, parameters: &Parameters) {
+        *self = Self {
+            stop: self.stop,
+            brake_energy_j: self.brake_energy_j,
+            ..Self::new(parameters)
+        };
+    }
+
+    /// Energy in the brake in J.
+    pub fn brake_energy_j(&self) -> f32 {
+        self.brake_energy_j
+    }
+
+    /// Whether the emergency stop has been seen to work since the start.
+    pub fn stop_is_proven(&self) -> bool {
+        self.stop.is_proven()
     }
 
     /// Every condition that holds at this sample, whatever the state.
@@ -139,8 +188,19 @@ impl Interlocks {
         circumstances: &Circumstances,
     ) -> FaultSet {
         let mut faults = FaultSet::default();
-        faults.add_if(raw.emergency_stop, Fault::EmergencyStop);
+        faults.add_if(raw.emergency_stop != [false; 2], Fault::EmergencyStop);
+        self.stop.update(raw.emergency_stop);
+        faults.add_if(self.stop.disagrees(), Fault::StopChannels);
+        let told = circumstances.demand > 0.0;
+        self.dump_wrong = if raw.holds == told {
+            0
+        } else {
+            self.dump_wrong.saturating_add(1)
+        };
+        faults.add_if(self.dump_wrong >= DUMP_SAMPLES, Fault::DumpOutput);
+        self.heat(converted, circumstances.demand, &mut faults);
         self.speeds(converted, &mut faults);
+        self.free_rolling(converted, told, &mut faults);
         self.bridge(raw, converted, &mut faults);
         faults.add_if(
             circumstances.silent_samples > SILENT_SAMPLES,
@@ -200,18 +260,50 @@ impl Interlocks {
         self.last_vehicle_rad_s = converted.vehicle.rad_s;
     }
 
+    /// What the brake takes up at the torque that it is told, which a low friction of its lining only lowers.
+    fn heat(&mut self, converted: &Converted, demand: f32, faults: &mut FaultSet) {
+        let heat = &self.parameters.brake_heat;
+        let torque_nm = demand * self.parameters.brake.torque_at_full_nm;
+        let power_w = torque_nm * converted.wheel.rad_s.max(0.0);
+        let cooled = self.brake_energy_j * (1.0 - SAMPLE_S / heat.cooling_time_s);
+        self.brake_energy_j = cooled + power_w * SAMPLE_S;
+        faults.add_if(self.brake_energy_j > heat.maximum_energy_j, Fault::BrakeHot);
+    }
+
+    /// A wheel that rolls freely turns as the vehicle moves: a wrong factor in either encoder, a wrong radius, a brake
+    /// that drags or a tyre that does not touch.
+    fn free_rolling(&mut self, converted: &Converted, brakes: bool, faults: &mut FaultSet) {
+        let vehicle_m_s = converted.sample.vehicle_speed_m_s;
+        let surface_m_s = converted.wheel.rad_s * self.parameters.wheel.effective_radius_m;
+        let off = (surface_m_s - vehicle_m_s).abs() > ROLLING_SLIP * vehicle_m_s;
+        self.disagreeing = if !brakes && vehicle_m_s > LOCK_SPEED_M_S && off {
+            self.disagreeing.saturating_add(1)
+        } else {
+            0
+        };
+        faults.add_if(
+            self.disagreeing > DISAGREEING_SAMPLES,
+            Fault::SpeedsDisagree,
+        );
+    }
+
     fn bridge(&mut self, raw: &RawSample, converted: &Converted, faults: &mut FaultSet) {
         let limits = &self.parameters.limits;
         let codes = raw.bridge.codes;
-        if codes == self.last_codes {
-            self.repeats = self.repeats.saturating_add(1);
-        } else {
-            self.repeats = 1;
-            self.last_codes = codes;
+        for ((repeats, last), code) in self.repeats.iter_mut().zip(self.last_codes).zip(codes) {
+            *repeats = if code == last {
+                repeats.saturating_add(1)
+            } else {
+                1
+            };
         }
+        self.last_codes = codes;
+        let [a, b] = self.repeats;
         faults.add_if(raw.bridge.quality == BridgeQuality::Bad, Fault::BridgeLost);
         faults.add_if(
-            raw.bridge.quality == BridgeQuality::Stale || self.repeats >= FROZEN_SAMPLES,
+            raw.bridge.quality == BridgeQuality::Stale
+                || a.min(b) >= FROZEN_SAMPLES
+                || a.max(b) >= STUCK_SAMPLES,
             Fault::BridgeFrozen,
         );
         let ends = codes.iter().any(|code| code.unsigned_abs() >= LARGEST_CODE);
@@ -219,7 +311,20 @@ impl Interlocks {
         let beyond = [sample.drag_force_n, sample.normal_force_n]
             .iter()
             .any(|force| force.abs() > limits.maximum_force_n);
-        faults.add_if(ends || beyond, Fault::BridgeOutOfRange);
+        let forces_n = [sample.drag_force_n, sample.normal_force_n];
+        let jumped = forces_n
+            .iter()
+            .zip(self.last_forces_n)
+            .any(|(now, last)| (now - last).abs() > 0.5 * limits.maximum_force_n);
+        self.last_forces_n = forces_n;
+        // Each counts for a time; a glitch is one there and one back.
+        self.jumps = if jumped {
+            self.jumps.saturating_add(JUMP_SAMPLES)
+        } else {
+            self.jumps.saturating_sub(1)
+        };
+        let chatters = self.jumps > 2 * JUMP_SAMPLES;
+        faults.add_if(ends || beyond || chatters, Fault::BridgeOutOfRange);
         faults.add_if(
             sample.normal_force_n < limits.minimum_normal_force_n,
             Fault::NormalForceLost,

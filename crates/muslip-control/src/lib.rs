@@ -41,6 +41,7 @@ pub mod link;
 mod number;
 pub mod sequence;
 pub mod slip_hold;
+pub mod stop;
 pub mod store;
 pub mod validate;
 

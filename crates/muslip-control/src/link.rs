@@ -40,6 +40,8 @@ pub struct Link {
     reader: FrameReader,
     counters: LinkCounters,
     last: Option<(u16, Answer)>,
+    /// The number that was furthest ahead.
+    newest: Option<u16>,
     sequence: u16,
     silent_samples: u32,
 }
@@ -66,6 +68,7 @@ impl Link {
                 dropped: 0,
             },
             last: None,
+            newest: None,
             sequence: 0,
             silent_samples: u32::MAX,
         }
@@ -76,7 +79,7 @@ impl Link {
         self.counters
     }
 
-    /// Samples since the last whole frame.
+    /// Samples since the last whole frame with a number of its own: a wire that repeats frames says nothing of its host.
     pub fn silent_samples(&self) -> u32 {
         self.silent_samples
     }
@@ -99,7 +102,10 @@ impl Link {
         let counter = match self.reader.take::<Envelope<Command>>() {
             Ok(Envelope { sequence, body }) => {
                 self.counters.received = self.counters.received.saturating_add(1);
-                self.silent_samples = 0;
+                if self.is_news(sequence, &body) {
+                    self.silent_samples = 0;
+                    self.newest = Some(sequence);
+                }
                 return self.accept(sequence, body);
             }
             Err(FrameError::Corrupt) => &mut self.counters.corrupt,
@@ -108,6 +114,14 @@ impl Link {
         };
         *counter = counter.saturating_add(1);
         None
+    }
+
+    /// Whether a frame comes from a host that goes on: numbers count up, but for a host that begins with a hello.
+    fn is_news(&self, sequence: u16, command: &Command) -> bool {
+        self.newest.is_none_or(|newest| {
+            let ahead = sequence.wrapping_sub(newest);
+            ahead != 0 && (ahead < 1 << 15 || *command == Command::Hello)
+        })
     }
 
     fn accept(&mut self, sequence: u16, command: Command) -> Option<Arrival> {

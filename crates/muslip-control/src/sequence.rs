@@ -9,12 +9,12 @@
 //! | `Idle` | dumped | reset; stop from `Armed`, `SpinUp` or `Done`; a fault cleared | `Arm`, with no interlock standing | none |
 //! | `Armed` | dumped | `Arm` | `Start` -> `SpinUp`; `Stop` -> `Idle` | 60 s -> `Idle` |
 //! | `SpinUp` | dumped | `Start`; after a pause | start speed, and slip within ±0.05 for 0.2 s -> `Ramp` | 120 s -> `Fault(Timeout)` |
-//! | `Ramp` | by the program | speed reached | slip at the profile's skid slip -> `Skid`; program over, `Stop`, or vehicle below 5 m/s -> `Release` | the program's length |
-//! | `Skid` | holds what it had | skid slip | after the profile's hold, or `Stop` -> `Release` | 0.15 s at most |
+//! | `Ramp` | by the program | speed reached | slip at the profile's skid slip -> `Skid`; program over, `Stop`, slip without a meaning, or vehicle below 5 m/s -> `Release` | the program's length |
+//! | `Skid` | holds what it had | skid slip | after the profile's hold, `Stop`, or slip without a meaning -> `Release` | 0.15 s at most |
 //! | `Release` | dumped | above | slip within ±0.05 for 50 ms, or vehicle below 5 m/s -> `Cool` | 1 s -> `Fault(Timeout)` |
 //! | `Cool` | dumped | wheel rolls | after the pause: more to do -> `SpinUp`, else -> `Done`; `Stop` -> `Done` | the profile's pause |
 //! | `Done` | dumped | all applications made | `Arm` -> `Armed`; `Stop` -> `Idle` | none |
-//! | `Fault` | dumped | any interlock while not `Idle` or `Done` | `ClearFault` with its cause gone -> `Idle` | none |
+//! | `Fault` | dumped | any interlock while not `Idle` or `Done` | `ClearFault` with its cause gone, and the button at the rig pressed since -> `Idle` | none |
 //!
 //! Interlocks stand in every state; they latch from `Armed` to `Cool`, where the brake may be at work, and
 //! forbid arming elsewhere. A brake demand exists in `Ramp` and `Skid` only.
@@ -198,11 +198,10 @@ impl Sequence {
                         hold_s,
                     } => (into_s < *hold_s).then(|| slip_hold(*target_slip)),
                 };
-                let skids = observed
-                    .slip_ratio
-                    .is_some_and(|slip| slip >= profile.skid_slip);
-                match demand {
-                    Some(demand) if !observed.stop && !slow => {
+                // Slip that nobody knows may be any: the brake must not go on rising on it.
+                let skids = observed.slip_ratio.map(|slip| slip >= profile.skid_slip);
+                match (demand, skids) {
+                    (Some(demand), Some(skids)) if !observed.stop && !slow => {
                         self.held_demand = demand;
                         if skids {
                             self.enter(State::Skid);
@@ -213,7 +212,12 @@ impl Sequence {
                 }
             }
             State::Skid => {
-                if observed.stop || slow || nearest(self.samples) * SAMPLE_S > profile.skid_hold_s {
+                let unknown = observed.slip_ratio.is_none();
+                if observed.stop
+                    || slow
+                    || unknown
+                    || nearest(self.samples) * SAMPLE_S > profile.skid_hold_s
+                {
                     self.enter(State::Release);
                 } else {
                     return self.held_demand;

@@ -46,6 +46,8 @@ pub fn parameters(p: &Parameters) -> Result<(), u8> {
         positive(p.slip_control.bandwidth_rad_s),
         positive(p.slip_control.integral_time_s),
         positive(p.slip_control.maximum_torque_rate_nm_s),
+        ceiling::BRAKE_ENERGY_J.allows(p.brake_heat.maximum_energy_j),
+        ceiling::COOLING_TIME_S.allows(p.brake_heat.cooling_time_s),
     ];
     match (0..).zip(checks).find(|(_, good)| !good) {
         Some((number, _)) => Err(number),
@@ -112,7 +114,7 @@ mod tests {
     #[test]
     fn no_limit_that_an_interlock_uses_can_be_set_so_that_it_never_fires() {
         type Set = fn(&mut Parameters, f32);
-        let limits: [(u8, ceiling::Ceiling, Set); 11] = [
+        let limits: [(u8, ceiling::Ceiling, Set); 13] = [
             (0, ceiling::EFFECTIVE_RADIUS_M, |p, v| {
                 p.wheel.effective_radius_m = v;
             }),
@@ -143,6 +145,12 @@ mod tests {
             }),
             (19, ceiling::MINIMUM_SUPPLY_V, |p, v| {
                 p.limits.minimum_supply_v = v;
+            }),
+            (28, ceiling::BRAKE_ENERGY_J, |p, v| {
+                p.brake_heat.maximum_energy_j = v;
+            }),
+            (29, ceiling::COOLING_TIME_S, |p, v| {
+                p.brake_heat.cooling_time_s = v;
             }),
         ];
         for (field, limit, set) in limits {

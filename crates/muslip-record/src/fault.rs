@@ -4,7 +4,7 @@ use crate::{End, Fault, State};
 
 impl Fault {
     /// In the order of their numbers, which is the order in which they are named.
-    pub const ALL: [Self; 19] = [
+    pub const ALL: [Self; 23] = [
         Self::EmergencyStop,
         Self::WheelLocked,
         Self::Overspeed,
@@ -24,6 +24,10 @@ impl Fault {
         Self::Clock,
         Self::Timeout,
         Self::SetUp,
+        Self::StopChannels,
+        Self::DumpOutput,
+        Self::SpeedsDisagree,
+        Self::BrakeHot,
     ];
 }
 

@@ -52,8 +52,8 @@ mod wire;
 pub use frame::{BODY_BYTES, EncodeError, FRAME_BYTES, FrameError, FrameReader, encode};
 pub use hash::{PARAMETERS_HASH, SCHEMA_HASH};
 pub use parameters::{
-    BrakeParameters, EncoderParameters, EstimatorParameters, ForceParameters, LimitParameters,
-    Parameters, SlipControlParameters, TyreRange, WheelParameters,
+    BrakeParameters, EncoderParameters, EstimatorParameters, ForceParameters, HeatParameters,
+    LimitParameters, Parameters, SlipControlParameters, TyreRange, WheelParameters,
 };
 pub use wire::{
     Answer, Command, End, Envelope, Estimate, Event, Fault, Hello, LinkCounters, Origin,

@@ -27,6 +27,8 @@ pub struct Parameters {
     pub estimator: EstimatorParameters,
     /// Slip control.
     pub slip_control: SlipControlParameters,
+    /// Heat of the brake.
+    pub brake_heat: HeatParameters,
 }
 
 /// The braked wheel and what it slows.
@@ -120,6 +122,15 @@ pub struct SlipControlParameters {
     pub maximum_torque_rate_nm_s: f32,
 }
 
+/// Heat of the brake: what its torque at the demand does on the wheel, less what leaves it.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct HeatParameters {
+    /// Energy in J above the surroundings that the brake bears, 1,000..=100,000,000.
+    pub maximum_energy_j: f32,
+    /// Time in s after which 1/e of it is left, 1..=3,600.
+    pub cooling_time_s: f32,
+}
+
 impl Default for Parameters {
     /// A car wheel on a drum of 2 m: the rig of the bundled recording with common encoders and bridges.
     /// Safe to start from, not a calibration.
@@ -170,6 +181,11 @@ impl Default for Parameters {
                 bandwidth_rad_s: 20.0,
                 integral_time_s: 0.3,
                 maximum_torque_rate_nm_s: 10_000.0,
+            },
+            // A disc of 8 kg, 450 K warmer.
+            brake_heat: HeatParameters {
+                maximum_energy_j: 1_800_000.0,
+                cooling_time_s: 120.0,
             },
         }
     }

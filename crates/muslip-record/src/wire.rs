@@ -21,9 +21,9 @@ pub struct Envelope<T> {
 pub enum Command {
     /// Who is there? Answered by [`Telemetry::Hello`].
     Hello,
-    /// Nothing but a sign of life: due every 250 ms while armed.
+    /// Nothing but a sign of life: due every 250 ms while armed, each with a number of its own.
     KeepAlive,
-    /// Idle or done to armed, if no interlock stands and the parameters are the rig's.
+    /// Idle or done to armed, if no interlock stands, the parameters are the rig's, and the emergency stop was tested.
     Arm,
     /// Armed to a run.
     Start {
@@ -34,7 +34,7 @@ pub enum Command {
     Stop,
     /// Takes the present bridge codes as no force; only while idle and at standstill.
     Tare,
-    /// Unlatches the fault, if its cause is gone.
+    /// Unlatches the fault, if its cause is gone and somebody has pressed the button at the rig since.
     ClearFault,
     /// Takes new parameters, all or none, and stores them; only while idle.
     SetParameters {
@@ -200,6 +200,10 @@ pub enum Refusal {
     Storage,
     /// The parameters in use are nobody's for this rig: see [`Origin`]. Set them first.
     Unconfirmed,
+    /// The emergency stop has not been worked since the start: open it and close it once.
+    StopUntested,
+    /// Nobody has pressed the button at the rig since the fault.
+    NotConfirmed,
 }
 
 /// Where a run is. The conditions of entry and exit are with the state machine.
@@ -269,6 +273,14 @@ pub enum Fault {
     Timeout,
     /// A register of the controller's chip does not hold what start-up wrote to it; the log names it.
     SetUp,
+    /// The two channels of the emergency stop say different things.
+    StopChannels,
+    /// The dump valve's output is not at the level that it was told.
+    DumpOutput,
+    /// Wheel and vehicle differ by more than 5 % though the brake has long been dumped.
+    SpeedsDisagree,
+    /// The brake has taken up more energy than it bears.
+    BrakeHot,
 }
 
 /// Something that happened.
@@ -406,6 +418,8 @@ pub struct Status {
     pub worst_step_cycles: u32,
     /// Deepest stack so far in bytes.
     pub stack_used_bytes: u32,
+    /// Energy in the brake as modelled, in J.
+    pub brake_energy_j: u32,
     /// Where the parameters in use come from.
     pub parameters: Origin,
     /// What caused the last reset: bits 31 to 24 of the chip's RCC_CSR; 0 in the emulator.

@@ -83,6 +83,7 @@ fn the_longest_messages_fit_a_frame() {
         worst_link_interrupt_cycles: all,
         worst_step_cycles: all,
         stack_used_bytes: all,
+        brake_energy_j: all,
         parameters: Origin::Previous,
         reset_flags: u8::MAX,
         end: Some(PostMortem {

@@ -22,9 +22,10 @@ use muslip_control::board::{Actuators, NotStored, RawSample, Sensors};
 use muslip_control::brake::BrakeOutput;
 use muslip_control::store::{Loaded, Store};
 use muslip_record::Parameters;
-use stm32f4::stm32f405::{ADC1, GPIOB, IWDG, Peripherals};
+use stm32f4::stm32f405::{ADC1, GPIOB, GPIOC, IWDG, Peripherals};
 
 use crate::counter::cycles;
+use crate::dump::DUMP_LINE;
 use crate::registers::{self, set_up};
 use crate::settings::{CORE_HZ, supply_mv, wait_for};
 use crate::valves::Valves;
@@ -36,8 +37,10 @@ use outputs::{DumpPin, ValvePwm};
 
 pub use clock::runs_at_full_clock;
 
-/// Line of GPIOB that is high while the emergency stop's loop is closed.
-const EMERGENCY_STOP_LINE: u32 = 1;
+/// Lines that are high while the emergency stop's channels are closed: of GPIOB, and of GPIOC.
+const EMERGENCY_STOP_LINES: [u32; 2] = [1, 4];
+/// Line of GPIOB that is high while the button at the rig is pressed.
+const CONFIRM_LINE: u32 = 10;
 
 /// End of conversion, of the ADC's status (13.13.1).
 const EOC: u32 = 1 << 1;
@@ -47,7 +50,8 @@ pub struct ChipSensors {
     encoders: Encoders,
     bridge: Bridge,
     adc: ADC1,
-    ports: GPIOB,
+    port_b: GPIOB,
+    port_c: GPIOC,
 }
 
 /// The rig's valves, watchdog and flash.
@@ -96,7 +100,8 @@ pub fn start(_: &Peripherals) -> Up {
         encoders: Encoders::start(p.TIM3, p.TIM4, p.TIM5, p.TIM2),
         bridge: Bridge::start(p.SPI2),
         adc: p.ADC1,
-        ports: p.GPIOB,
+        port_b: p.GPIOB,
+        port_c: p.GPIOC,
     };
     Up {
         sensors,
@@ -151,7 +156,8 @@ pub fn sampling_instructions() -> u32 {
         encoders: Encoders::untouched(p.TIM3, p.TIM4, p.TIM5, p.TIM2),
         bridge: Bridge::untouched(p.SPI2),
         adc: p.ADC1,
-        ports: p.GPIOB,
+        port_b: p.GPIOB,
+        port_c: p.GPIOC,
     };
     let start = cycles();
     core::hint::black_box(sensors.read());
@@ -168,12 +174,19 @@ impl Sensors for ChipSensors {
         let code = self.adc.dr().read().bits() as u16;
         let code = if converted { code } else { 0 };
         self.adc.cr2().write(|w| unsafe { w.bits(1 | 1 << 30) });
+        let (port_b, port_c) = (
+            self.port_b.idr().read().bits(),
+            self.port_c.idr().read().bits(),
+        );
+        let [line_b, line_c] = EMERGENCY_STOP_LINES;
         RawSample {
             wheel,
             vehicle,
             bridge: self.bridge.read(),
             supply_mv: supply_mv(code),
-            emergency_stop: self.ports.idr().read().bits() & 1 << EMERGENCY_STOP_LINE == 0,
+            emergency_stop: [port_b & 1 << line_b == 0, port_c & 1 << line_c == 0],
+            holds: port_b & 1 << DUMP_LINE != 0,
+            confirm: port_b & 1 << CONFIRM_LINE != 0,
             late: false,
         }
     }

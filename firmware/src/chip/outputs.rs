@@ -36,6 +36,14 @@ impl SetDutyCycle for ValvePwm {
         self.0
             .ccr1()
             .write(|w| unsafe { w.bits(u32::from(duty) as _) });
+        if duty == 0 {
+            // The duty of 0 is taken at once (UG), then outputs are driven again that a break has switched off: not
+            // before, and not while there is still a duty.
+            self.0.egr().write(|w| unsafe { w.bits(1) });
+            self.0
+                .bdtr()
+                .write(|w| unsafe { w.bits((registers::BREAK | registers::OUTPUTS_ON) as _) });
+        }
         Ok(())
     }
 }

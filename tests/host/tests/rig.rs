@@ -187,7 +187,7 @@ fn parameters_are_printed_set_and_refused_by_name() {
 #[test]
 fn an_interlock_that_stands_is_named_and_nothing_is_recorded() {
     let server = Server::start(Trouble {
-        emergency_stop: true,
+        emergency_stop: [true; 2],
         ..Trouble::default()
     });
     let scratch = Scratch::new();

@@ -23,8 +23,12 @@ const NORMAL_NOISE_N: f64 = 20.0;
 /// Something wrong with the rig or its sensors.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Trouble {
-    /// The emergency stop's loop is open.
-    pub emergency_stop: bool,
+    /// A channel of the emergency stop is open.
+    pub emergency_stop: [bool; 2],
+    /// The dump valve's output stays at this level: true holds pressure.
+    pub holds: Option<bool>,
+    /// The button that confirms a fault is pressed.
+    pub confirm: bool,
     /// No pulses from the wheel's encoder.
     pub wheel_lost: bool,
     /// No pulses from the vehicle's encoder.
@@ -39,6 +43,10 @@ pub struct Trouble {
     pub bridge: BridgeQuality,
     /// The bridge converter repeats its codes.
     pub bridge_frozen: bool,
+    /// The drag's code stays as it is.
+    pub drag_stuck: bool,
+    /// The drag's contact opens on every other sample.
+    pub drag_chatters: bool,
     /// Drag in N added by a broken bridge.
     pub drag_offset_n: f64,
     /// The tyre is lifted.
@@ -195,7 +203,7 @@ impl Rig {
         }
         self.wheel.counted += f64::from(trouble.extra_wheel_pulses);
         self.vehicle.counted += f64::from(trouble.extra_vehicle_pulses);
-        self.read(normal_force_n)
+        self.read(normal_force_n, brake)
     }
 
     fn demand_nm(&self, brake: BrakeOutput) -> f64 {
@@ -211,7 +219,7 @@ impl Rig {
         ((duty - zero) / (full - zero)).clamp(0.0, 1.0) * f64::from(calibration.torque_at_full_nm)
     }
 
-    fn read(&mut self, normal_force_n: f64) -> RawSample {
+    fn read(&mut self, normal_force_n: f64, brake: BrakeOutput) -> RawSample {
         let mut noise = |sigma: f64| {
             let draw: f64 = StandardNormal.sample(&mut self.random);
             sigma * draw
@@ -220,6 +228,11 @@ impl Rig {
             .plant
             .drag_n(&self.plant.contact(normal_force_n.max(1.0)))
             + self.trouble.drag_offset_n
+            + if self.trouble.drag_chatters && self.samples.is_multiple_of(2) {
+                10_000.0
+            } else {
+                0.0
+            }
             + noise(DRAG_NOISE_N);
         let normal_n = normal_force_n + noise(NORMAL_NOISE_N);
         let code = |force: f64, scale: f32| {
@@ -228,8 +241,13 @@ impl Rig {
                 .clamp(-8_388_608.0, 8_388_607.0) as i32
         };
         if !self.trouble.bridge_frozen {
+            let [drag, _] = self.bridge.codes;
             self.bridge.codes = [
-                code(drag_n, self.parameters.drag.newton_per_code),
+                if self.trouble.drag_stuck {
+                    drag
+                } else {
+                    code(drag_n, self.parameters.drag.newton_per_code)
+                },
                 code(normal_n, self.parameters.normal.newton_per_code),
             ];
         }
@@ -240,7 +258,14 @@ impl Rig {
             vehicle: self.vehicle.reading(now_s),
             bridge: self.bridge,
             supply_mv: (self.trouble.supply_v.unwrap_or(24.0) * 1000.0) as u16,
-            emergency_stop: self.trouble.emergency_stop,
+            // Somebody tests it when the rig is switched on.
+            emergency_stop: if (2..5).contains(&self.samples) {
+                [true; 2]
+            } else {
+                self.trouble.emergency_stop
+            },
+            holds: self.trouble.holds.unwrap_or(brake.hold_pressure),
+            confirm: self.trouble.confirm,
             late: false,
         }
     }

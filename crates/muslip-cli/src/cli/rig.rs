@@ -257,6 +257,10 @@ fn print_status(status: &Status, terminal: &mut Terminal) -> Result<(), Failure>
                 status.worst_step_cycles
             ),
         ),
+        (
+            "energy in the brake",
+            format!("{:.1} kJ", f64::from(status.brake_energy_j) * 1e-3),
+        ),
         ("last end of the program", end(status)),
         (
             "deepest stack",

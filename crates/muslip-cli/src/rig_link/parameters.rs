@@ -6,7 +6,7 @@ use muslip_record::Parameters;
 use muslip_recordings::input_error::{InputError, InputProblem, one_line, system_reason};
 
 /// Names of the parameters in the order in which the controller counts them.
-const NAMES: [&str; 28] = [
+const NAMES: [&str; 30] = [
     "wheel.effective_radius_m",
     "wheel.inertia_kg_m2",
     "wheel.vehicle_mass_kg",
@@ -35,6 +35,8 @@ const NAMES: [&str; 28] = [
     "slip_control.bandwidth_rad_s",
     "slip_control.integral_time_s",
     "slip_control.maximum_torque_rate_nm_s",
+    "brake_heat.maximum_energy_j",
+    "brake_heat.cooling_time_s",
 ];
 
 /// The name of the parameter that a controller refused by its number.
@@ -78,6 +80,7 @@ struct TopLevelFirst {
     limits: muslip_record::LimitParameters,
     estimator: muslip_record::EstimatorParameters,
     slip_control: muslip_record::SlipControlParameters,
+    brake_heat: muslip_record::HeatParameters,
 }
 
 impl From<&Parameters> for TopLevelFirst {
@@ -93,6 +96,7 @@ impl From<&Parameters> for TopLevelFirst {
             limits: p.limits,
             estimator: p.estimator,
             slip_control: p.slip_control,
+            brake_heat: p.brake_heat,
         }
     }
 }

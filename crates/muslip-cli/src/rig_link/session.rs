@@ -53,6 +53,13 @@ fn reason(refusal: &Refusal) -> String {
             "its parameters are not this rig's; set them with: muslip rig parameters --set"
                 .to_owned()
         }
+        Refusal::StopUntested => {
+            "its emergency stop is untested since it was switched on; open it and close it"
+                .to_owned()
+        }
+        Refusal::NotConfirmed => {
+            "nobody has confirmed the fault at the rig; press its button".to_owned()
+        }
         Refusal::Moving => "it is moving".to_owned(),
         Refusal::Storage => {
             "the parameters apply until the next reset but could not be stored".to_owned()

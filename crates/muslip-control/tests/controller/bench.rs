@@ -43,7 +43,12 @@ pub struct Rig {
     pub drag_n: f64,
     pub normal_n: f64,
     pub supply_mv: u16,
-    pub emergency_stop: bool,
+    pub emergency_stop: [bool; 2],
+    /// The dump valve's output stays as it is, whatever it is told.
+    pub holds: Option<bool>,
+    /// The drag's code stays as it is.
+    pub stuck_drag: bool,
+    pub confirm: bool,
     pub quality: BridgeQuality,
     pub frozen: bool,
     pub late: bool,
@@ -59,7 +64,10 @@ impl Rig {
             drag_n: 0.0,
             normal_n: 4120.0,
             supply_mv: 24_000,
-            emergency_stop: false,
+            emergency_stop: [false; 2],
+            holds: None,
+            stuck_drag: false,
+            confirm: false,
             quality: BridgeQuality::Fresh,
             frozen: false,
             late: false,
@@ -113,6 +121,7 @@ pub struct Bench {
     pub samples: u64,
     pub number: u16,
     pub keep_alive: bool,
+    pub stop_is_tested: bool,
     pub frozen: RawSample,
     pub output: BrakeOutput,
     pub heard: Vec<Telemetry>,
@@ -145,6 +154,7 @@ impl Bench {
             samples: 0,
             number: 0,
             keep_alive: true,
+            stop_is_tested: true,
             frozen: RawSample::default(),
             output: BrakeOutput::DUMPED,
             heard: Vec::new(),
@@ -162,13 +172,23 @@ impl Bench {
             vehicle: self.vehicle.turn(now_s, self.rig.vehicle_m_s, 1000.0),
             bridge: BridgeReading {
                 codes: [
-                    code(self.rig.drag_n, self.samples),
+                    code(
+                        self.rig.drag_n,
+                        if self.rig.stuck_drag { 0 } else { self.samples },
+                    ),
                     code(self.rig.normal_n, self.samples / 2),
                 ],
                 quality: self.rig.quality,
             },
             supply_mv: self.rig.supply_mv,
-            emergency_stop: self.rig.emergency_stop,
+            // Somebody tests it when the rig is switched on.
+            emergency_stop: if self.stop_is_tested && (2..5).contains(&self.samples) {
+                [true; 2]
+            } else {
+                self.rig.emergency_stop
+            },
+            holds: self.rig.holds.unwrap_or(self.output.hold_pressure),
+            confirm: self.rig.confirm,
             late: self.rig.late,
         };
         if self.rig.frozen {
@@ -248,6 +268,14 @@ impl Bench {
 
     pub fn state(&self) -> State {
         self.controller.state()
+    }
+
+    /// Somebody presses the button at the rig.
+    pub fn confirm(&mut self) {
+        for pressed in [false, true, false] {
+            self.rig.confirm = pressed;
+            self.run(5);
+        }
     }
 
     /// Rolls until the meters know it, arms and starts.

@@ -38,7 +38,7 @@ fn dumped_after(change: impl FnOnce(&mut Bench)) -> (u32, Fault) {
 fn every_interlock_dumps_the_brake_on_the_sample_on_which_its_condition_holds() {
     let now = |fault| (1, fault);
     assert_eq!(
-        dumped_after(|b| b.rig.emergency_stop = true),
+        dumped_after(|b| b.rig.emergency_stop = [true; 2]),
         now(Fault::EmergencyStop)
     );
     assert_eq!(
@@ -202,7 +202,7 @@ fn an_estimator_that_refuses_its_own_state_is_a_fault() {
     assert_eq!(bench.output, BrakeOutput::DUMPED);
     // A new start needs the fault cleared, and begins a new estimate.
     bench.rig = Rig::rolling(20.0);
-    bench.run(10);
+    bench.confirm();
     assert_eq!(bench.say(Command::ClearFault), Answer::Done);
     assert_eq!(bench.say(Command::Arm), Answer::Done);
 }
@@ -215,6 +215,7 @@ fn a_watchdog_reset_a_slow_clock_and_a_failed_set_up_forbid_arming() {
     });
     bench.run(10);
     assert_eq!(bench.controller.fault(), Some(Fault::Watchdog));
+    bench.confirm();
     assert_eq!(bench.say(Command::ClearFault), Answer::Done);
     assert_eq!(bench.say(Command::Arm), Answer::Done);
     let mut bench = Bench::with(Identity {

@@ -6,6 +6,7 @@
 )]
 
 mod bench;
+mod guards;
 mod interlocks;
 mod link;
 mod parameters;

@@ -21,7 +21,7 @@ pub fn log(image: &Path) -> Result<Found> {
     bench.begin(RAMP)?;
     bench.until(State::Ramp, 1_000)?;
     bench.run(100)?;
-    bench.rig.trouble.emergency_stop = true;
+    bench.rig.trouble.emergency_stop = [true; 2];
     bench.run(10)?;
     let lines = log::decode(&std::fs::read(image)?, &bench.qemu.log()?)?;
     let wanted = [

@@ -45,8 +45,28 @@ fn injections() -> Vec<Injection> {
     let at_once = Injection::at_once;
     vec![
         at_once(Fault::EmergencyStop, |b| {
-            trouble(b, |t| t.emergency_stop = true)
+            trouble(b, |t| t.emergency_stop = [true; 2])
         }),
+        at_once(Fault::EmergencyStop, |b| {
+            trouble(b, |t| t.emergency_stop = [false, true])
+        }),
+        // Its second sample: a pin needs a moment.
+        Injection {
+            samples: 2,
+            ..at_once(Fault::DumpOutput, |b| trouble(b, |t| t.holds = Some(false)))
+        },
+        // The 25th time that a code is the same; the first is the sample before.
+        Injection {
+            samples: 24,
+            ..at_once(Fault::BridgeFrozen, |b| trouble(b, |t| t.drag_stuck = true))
+        },
+        // A contact that chatters: the third jump.
+        Injection {
+            samples: 3,
+            ..at_once(Fault::BridgeOutOfRange, |b| {
+                trouble(b, |t| t.drag_chatters = true)
+            })
+        },
         at_once(Fault::BridgeLost, |b| {
             trouble(b, |t| t.bridge = BridgeQuality::Bad)
         }),
