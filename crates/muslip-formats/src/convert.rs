@@ -1,0 +1,580 @@
+//! From the channels of a file to the columns of a recording: SI units, one time.
+
+use std::collections::BTreeSet;
+use std::f64::consts::PI;
+use std::sync::Arc;
+
+use crate::error::{FormatError, Problem};
+use crate::format::Format;
+use crate::map::{Entry, Map};
+use crate::raster::{self, Done};
+use crate::roles::{self, Assigned, Roles, TIME};
+use crate::source::{Channel, Series, SourceFile};
+use crate::units::{self, Quantity};
+
+/// Most rows that a raster of `rate_hz` may have.
+const MOST_ROWS: f64 = 2e8;
+
+/// Something of a channel that a diagnosis must know.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Fault {
+    /// The column.
+    pub column: String,
+    /// From when, in s of the recording's time.
+    pub start_s: f64,
+    /// Until when.
+    pub end_s: f64,
+    /// What, in words.
+    pub what: String,
+}
+
+/// A recording made of a file of another format.
+#[derive(Debug, Clone)]
+pub struct Converted {
+    /// The file's format.
+    pub format: Format,
+    /// Start of the measurement in RFC 3339.
+    pub start_time: Option<String>,
+    /// Headers; the first is `time_s`.
+    pub names: Vec<String>,
+    /// As many columns, all of one length. Missing is `NaN`.
+    pub columns: Vec<Vec<f64>>,
+    /// What was read, converted, interpolated, decimated or dropped, one line each.
+    pub notes: Vec<String>,
+    /// What of it a diagnosis must know.
+    pub faults: Vec<Fault>,
+    /// Columns of the contract that no channel became, and why.
+    pub refused: Vec<(&'static str, String)>,
+    /// The roles as they were found, as a map.
+    pub map: Map,
+    /// Whether the roles are a guess.
+    pub guessed: bool,
+}
+
+/// A channel brought to SI.
+struct Ready {
+    one: Assigned,
+    channel: Channel,
+    times: Arc<Vec<f64>>,
+    /// `NaN` where missing or invalid.
+    values: Vec<f64>,
+    invalid: u64,
+    unit: String,
+}
+
+/// Reads a file's columns by a map, or by a guess without one.
+///
+/// # Errors
+/// [`FormatError`]: a name of the map that is not there or fits several channels, a unit that is missing, unknown or of another quantity, a channel
+/// without a time, a time that repeats or goes back, no column at all, or what [`SourceFile::read`] says.
+pub fn convert(file: &mut SourceFile, map: Option<&Map>) -> Result<Converted, FormatError> {
+    let path = file.path().to_owned();
+    let fail = |problem: Problem| problem.in_file(&path);
+    let channels = file.channels().to_vec();
+    let named = map.filter(|map| !map.channels.is_empty());
+    let roles = match named {
+        Some(map) => roles::by_map(&channels, map).map_err(fail)?,
+        None => roles::guess(&channels),
+    };
+    if roles.assigned.is_empty() {
+        let told: Vec<&str> = roles
+            .refused
+            .iter()
+            .skip_while(|(role, _)| *role == TIME)
+            .map(|(_, reason)| reason.as_str())
+            .take(1)
+            .collect();
+        return Err(fail(Problem::whole(
+            told.first().copied().unwrap_or("the map names no channel"),
+        )));
+    }
+    let time = map.map(|map| map.time.clone()).unwrap_or_default();
+    let (ready, faults, keeps_time) = read(file, &channels, &roles)?;
+    let first_s = ready
+        .iter()
+        .filter_map(|one| one.times.first())
+        .copied()
+        .fold(f64::INFINITY, f64::min);
+    let start_s = if keeps_time { 0.0 } else { first_s };
+    let (grid, raster_name) = grid(&ready, &time).map_err(fail)?;
+    let mut out = Converted {
+        format: file.format(),
+        start_time: file.start_time(),
+        names: vec![TIME.to_owned()],
+        columns: vec![grid.iter().map(|time| time - start_s).collect()],
+        notes: Vec::new(),
+        faults: Vec::new(),
+        refused: roles.refused.clone(),
+        map: roles.as_map(&channels, &time),
+        guessed: roles.guessed,
+    };
+    let read_as = if roles.guessed {
+        "channels guessed from names and units"
+    } else {
+        "channels by the map"
+    };
+    let start = out
+        .start_time
+        .as_ref()
+        .map_or(String::new(), |start| format!(", started {start}"));
+    out.notes
+        .push(format!("read as {}{start}; {read_as}", out.format.word()));
+    out.notes.push(format!("{TIME}: {raster_name}"));
+    for one in ready {
+        let (values, done) = raster::onto(&grid, &one.times, &one.values, one.one.entry.method);
+        out.tell(&one, &values, done, &grid, start_s);
+        out.names.push(one.one.column);
+        out.columns.push(values);
+    }
+    let (from, to) = (
+        grid.first().copied().unwrap_or(0.0) - start_s,
+        grid.last().copied().unwrap_or(0.0) - start_s,
+    );
+    let mut told = BTreeSet::new();
+    for fault in faults.into_iter().chain(file.faults()) {
+        if told.insert(fault.clone()) {
+            out.notes.push(format!("fault: {fault}"));
+            out.faults.push(Fault {
+                column: TIME.to_owned(),
+                start_s: from,
+                end_s: to,
+                what: fault,
+            });
+        }
+    }
+    Ok(out)
+}
+
+impl Converted {
+    fn tell(&mut self, one: &Ready, values: &[f64], done: Done, grid: &[f64], start_s: f64) {
+        let column = &one.one.column;
+        let rate = |times: &[f64]| {
+            raster::rate_hz(times).map_or("one reading".to_owned(), |rate| {
+                format!("{} Hz", rounded(rate))
+            })
+        };
+        let (own, wanted) = (rate(&one.times), rate(grid));
+        let method = one.one.entry.method.word();
+        let done_in_words = match done {
+            Done::Kept => format!("{own}, kept"),
+            Done::Interpolated => format!("{own}, brought onto {wanted} ({method})"),
+            Done::Decimated => format!("{own}, low-passed and decimated to {wanted}"),
+        };
+        let empty = values.iter().filter(|value| value.is_nan()).count();
+        let mut note = format!(
+            "{column}: {}{}; {done_in_words}",
+            one.channel.shown(),
+            one.unit
+        );
+        if empty > 0 {
+            note.push_str(&format!("; {empty} empty"));
+        }
+        if one.invalid > 0 {
+            note.push_str(&format!("; {} readings invalid in the file", one.invalid));
+        }
+        self.notes.push(note);
+        let (Some(first), Some(last)) = (one.times.first(), one.times.last()) else {
+            return;
+        };
+        let mut fault = |start: f64, end: f64, what: String| {
+            self.faults.push(Fault {
+                column: column.clone(),
+                start_s: start - start_s,
+                end_s: end - start_s,
+                what,
+            });
+        };
+        match done {
+            Done::Kept => {}
+            Done::Interpolated => fault(
+                *first,
+                *last,
+                format!(
+                    "measured at {own}, interpolated ({method}) onto {wanted}: no more is known of it than its own readings"
+                ),
+            ),
+            Done::Decimated => fault(
+                *first,
+                *last,
+                format!("measured at {own}, low-passed without delay and decimated to {wanted}"),
+            ),
+        }
+        let longest = raster::longest_step_s(&one.times);
+        for pair in one
+            .times
+            .windows(2)
+            .filter(|pair| pair[1] - pair[0] > longest)
+            .take(100)
+        {
+            fault(
+                pair[0],
+                pair[1],
+                format!("gap of {} s", rounded(pair[1] - pair[0])),
+            );
+        }
+        if one.invalid > 0 {
+            fault(
+                *first,
+                *last,
+                format!(
+                    "{} readings are invalid in the file: left empty",
+                    one.invalid
+                ),
+            );
+        }
+    }
+}
+
+/// Three digits behind the point at most.
+fn rounded(value: f64) -> f64 {
+    (value * 1e3).round() / 1e3
+}
+
+/// Reads the channels of the roles; says what was dropped, and whether the time is the contract's own.
+fn read(
+    file: &mut SourceFile,
+    channels: &[Channel],
+    roles: &Roles,
+) -> Result<(Vec<Ready>, Vec<String>, bool), FormatError> {
+    let path = file.path().to_owned();
+    let fail = |problem: Problem| problem.in_file(&path);
+    // Before anything is read: a wrong unit is told at once.
+    let mut units = Vec::with_capacity(roles.assigned.len());
+    for one in &roles.assigned {
+        units.push(to_si(&channels[one.channel], &one.column, &one.entry).map_err(fail)?);
+    }
+    let wanted: Vec<usize> = roles.assigned.iter().map(|one| one.channel).collect();
+    let series = file.read(&wanted)?;
+    let mut times = Times::new(channels, roles);
+    let mut faults = Vec::new();
+    let mut ready = Vec::with_capacity(series.len());
+    for ((one, series), (factor, offset, unit)) in roles.assigned.iter().zip(series).zip(units) {
+        let channel = &channels[one.channel];
+        let Series {
+            time_s,
+            mut values,
+            invalid,
+        } = series;
+        let own = time_s.is_some();
+        let stamps = match time_s {
+            Some(stamps) => stamps,
+            None => times.of(file, channel, values.len())?,
+        };
+        if stamps.len() != values.len() {
+            return Err(fail(Problem::of(
+                channel.shown(),
+                format!("{} readings and {} time stamps", values.len(), stamps.len()),
+            )));
+        }
+        for value in &mut values {
+            *value = one.entry.scale * (factor * *value + offset) + one.entry.offset;
+            if !value.is_finite() {
+                *value = f64::NAN;
+            }
+        }
+        let mut count = 0;
+        for (value, _) in values
+            .iter_mut()
+            .zip(invalid.iter().flatten())
+            .filter(|(_, invalid)| **invalid)
+        {
+            *value = f64::NAN;
+            count += 1;
+        }
+        let (stamps, values, dropped) = timed(stamps, values);
+        if dropped > 0 {
+            faults.push(format!(
+                "{}: {dropped} readings without a time stamp were left out",
+                channel.shown()
+            ));
+        }
+        ordered(&stamps, channel, own, &times).map_err(fail)?;
+        let stamps = if one.entry.delay_s == 0.0 {
+            stamps
+        } else {
+            Arc::new(stamps.iter().map(|time| time - one.entry.delay_s).collect())
+        };
+        let mut unit = unit;
+        if one.entry.delay_s != 0.0 {
+            unit.push_str(&format!(", {} s of delay taken out", one.entry.delay_s));
+        }
+        ready.push(Ready {
+            one: one.clone(),
+            channel: channel.clone(),
+            times: stamps,
+            values,
+            invalid: count,
+            unit,
+        });
+    }
+    if ready.iter().all(|one| one.values.is_empty()) {
+        return Err(fail(Problem::whole("the mapped channels have no readings")));
+    }
+    Ok((ready, faults, times.keeps))
+}
+
+/// Readings whose time is a number.
+fn timed(times: Arc<Vec<f64>>, values: Vec<f64>) -> (Arc<Vec<f64>>, Vec<f64>, usize) {
+    let missing = times.iter().filter(|time| !time.is_finite()).count();
+    if missing == 0 {
+        return (times, values, 0);
+    }
+    let (times, values) = times
+        .iter()
+        .zip(values)
+        .filter(|(time, _)| time.is_finite())
+        .map(|(&time, value)| (time, value))
+        .unzip();
+    (Arc::new(times), values, missing)
+}
+
+fn ordered(times: &[f64], channel: &Channel, own: bool, shared: &Times<'_>) -> Result<(), Problem> {
+    let Some(at) = times.windows(2).position(|pair| pair[1] <= pair[0]) else {
+        return Ok(());
+    };
+    let verb = if times[at + 1] == times[at] {
+        "repeats"
+    } else {
+        "goes back"
+    };
+    let name = match (own, shared.named(channel)) {
+        (false, Some(time)) => time.shown(),
+        _ => channel.shown(),
+    };
+    let group = if channel.group.is_empty() {
+        String::new()
+    } else {
+        format!("group {}, ", channel.group)
+    };
+    Err(Problem::whole(format!(
+        "{group}channel {name}: its time {verb} at sample {}: {} s after {} s",
+        at + 1,
+        times[at + 1],
+        times[at]
+    )))
+}
+
+/// Times of formats that have none of their own: of the column of time, or of the channel that looks like one in the same group.
+struct Times<'a> {
+    channels: &'a [Channel],
+    roles: &'a Roles,
+    read: Vec<(usize, Arc<Vec<f64>>)>,
+    /// Whether the time was the contract's own column.
+    keeps: bool,
+}
+
+impl<'a> Times<'a> {
+    fn new(channels: &'a [Channel], roles: &'a Roles) -> Self {
+        Self {
+            channels,
+            roles,
+            read: Vec::new(),
+            keeps: false,
+        }
+    }
+
+    /// The time of a channel by its group: the group's own, else the one there is.
+    fn place(&self, channel: &Channel) -> Result<(usize, Entry), String> {
+        let explicit = self.roles.time.as_ref();
+        let in_group: Vec<usize> = (0..self.channels.len())
+            .filter(|&k| self.channels[k].group == channel.group)
+            .collect();
+        if let Some(time) = explicit
+            && (in_group.contains(&time.channel) || !self.roles.guessed)
+        {
+            return Ok((time.channel, time.entry.clone()));
+        }
+        let group: Vec<Channel> = in_group.iter().map(|&k| self.channels[k].clone()).collect();
+        let guessed = roles::guess(&group);
+        match (guessed.time, explicit) {
+            (Some(time), _) => Ok((in_group[time.channel], time.entry)),
+            (None, Some(time)) => Ok((time.channel, time.entry.clone())),
+            (None, None) => {
+                let refused = guessed.refused.into_iter().find(|(role, _)| *role == TIME);
+                Err(refused.map_or_else(|| "no time".to_owned(), |(_, reason)| reason))
+            }
+        }
+    }
+
+    fn named(&self, channel: &Channel) -> Option<&Channel> {
+        let (time, _) = self.place(channel).ok()?;
+        self.channels.get(time)
+    }
+
+    fn of(
+        &mut self,
+        file: &mut SourceFile,
+        channel: &Channel,
+        samples: usize,
+    ) -> Result<Arc<Vec<f64>>, FormatError> {
+        let path = file.path().to_owned();
+        let (at, entry) = self
+            .place(channel)
+            .map_err(|reason| Problem::whole(reason).in_file(&path))?;
+        let times = match self.read.iter().find(|(channel, _)| *channel == at) {
+            Some((_, times)) => Arc::clone(times),
+            None => {
+                let of_time = &self.channels[at];
+                let factor =
+                    time_factor(of_time, &entry).map_err(|problem| problem.in_file(&path))?;
+                let mut series = file.read(&[at])?;
+                let values = series.pop().map(|series| series.values).unwrap_or_default();
+                let values: Vec<f64> = values
+                    .iter()
+                    .map(|value| entry.scale * (factor * value) + entry.offset - entry.delay_s)
+                    .collect();
+                self.keeps |= of_time.name == TIME;
+                let times = Arc::new(values);
+                self.read.push((at, Arc::clone(&times)));
+                times
+            }
+        };
+        if times.len() == samples {
+            return Ok(times);
+        }
+        let reason = format!(
+            "{samples} readings, but its time {} has {}: give a time of the same length in a map, [channels.time_s]",
+            self.channels[at].shown(),
+            times.len()
+        );
+        Err(Problem::of(channel.shown(), reason).in_file(&path))
+    }
+}
+
+/// Seconds in one of a time channel's units.
+pub(crate) fn time_factor(channel: &Channel, entry: &Entry) -> Result<f64, Problem> {
+    let (factor, ..) = to_si(channel, TIME, entry)?;
+    Ok(factor)
+}
+
+/// Factor and offset to SI, and the conversion in words.
+fn to_si(channel: &Channel, column: &str, entry: &Entry) -> Result<(f64, f64, String), Problem> {
+    let wanted = roles::role(column).map(|role| role.quantity);
+    let spelling = entry.unit.as_deref().unwrap_or(&channel.unit);
+    let say = |reason: String| Problem::whole(format!("{column}: {}: {reason}", channel.shown()));
+    let key = format!("[channels.{column}]");
+    let words = |factor: f64, offset: f64, unit: &str, si: &str| {
+        let mut words = String::new();
+        let offset_in_words = if offset == 0.0 {
+            String::new()
+        } else {
+            format!(" {} {}", if offset < 0.0 { '-' } else { '+' }, offset.abs())
+        };
+        if units::bare(unit) != si || offset != 0.0 {
+            words = format!(", {si} = {factor} × {unit}{offset_in_words}");
+        }
+        if entry.scale != 1.0 || entry.offset != 0.0 {
+            words.push_str(&format!(", then {} × it + {}", entry.scale, entry.offset));
+        }
+        words
+    };
+    if units::bare(spelling).is_empty() {
+        return match wanted {
+            // The contract's own header says the unit.
+            Some(quantity) if channel.name == column => {
+                Ok((1.0, 0.0, words(1.0, 0.0, quantity.si(), quantity.si())))
+            }
+            Some(quantity) => Err(say(format!(
+                "it has no unit: give unit (of {}) in a map, {key}",
+                quantity.si()
+            ))),
+            None => Ok((1.0, 0.0, words(1.0, 0.0, "", ""))),
+        };
+    }
+    let Some(unit) = units::of(spelling) else {
+        return match wanted {
+            Some(quantity) => Err(say(format!(
+                "unit {spelling:?} is not known: give unit (of {}) in a map, {key}",
+                quantity.si()
+            ))),
+            None => Ok((1.0, 0.0, words(1.0, 0.0, spelling, spelling))),
+        };
+    };
+    let quantity = wanted.unwrap_or(unit.quantity);
+    let si = quantity.si();
+    match (unit.quantity, quantity) {
+        (own, wanted) if own == wanted && own != Quantity::Percent => Ok((
+            unit.factor,
+            unit.offset,
+            words(unit.factor, unit.offset, spelling, si),
+        )),
+        (Quantity::Percent, _) => match entry.percent_of {
+            Some(whole) => {
+                let factor = unit.factor * whole;
+                Ok((factor, 0.0, words(factor, 0.0, spelling, si)))
+            }
+            None if wanted.is_none() => Ok((1.0, 0.0, words(1.0, 0.0, spelling, spelling))),
+            None => Err(say(format!(
+                "% of what? give percent_of = (100 % in {si}) in a map, {key}"
+            ))),
+        },
+        (Quantity::Frequency, Quantity::AngularSpeed) => match entry.teeth {
+            Some(teeth) => {
+                let factor = unit.factor * 2.0 * PI / teeth;
+                Ok((factor, 0.0, words(factor, 0.0, spelling, si)))
+            }
+            None => Err(say(format!(
+                "{spelling} of a tone ring with how many teeth? give teeth (1 for revolutions) in a map, {key}"
+            ))),
+        },
+        _ => Err(say(format!(
+            "{spelling} is no unit of {si}: give unit, or scale with unit = {si:?}, in a map, {key}"
+        ))),
+    }
+}
+
+/// The raster's times, and how they came about.
+fn grid(ready: &[Ready], time: &crate::map::Time) -> Result<(Arc<Vec<f64>>, String), Problem> {
+    let rate = |one: &Ready| raster::rate_hz(&one.times).unwrap_or(0.0);
+    let chosen = match &time.raster {
+        Some(name) => ready
+            .iter()
+            .find(|one| &one.one.column == name)
+            .ok_or_else(|| {
+                let columns: Vec<&str> = ready.iter().map(|one| one.one.column.as_str()).collect();
+                Problem::whole(format!(
+                    "time.raster = {name:?}: no such column; there are {}",
+                    columns.join(", ")
+                ))
+            })?,
+        // The first of equals, so that the order of the contract decides and not a rounding.
+        None => ready
+            .iter()
+            .reduce(|best, one| {
+                if rate(one) > rate(best) * (1.0 + 1e-6) {
+                    one
+                } else {
+                    best
+                }
+            })
+            .ok_or_else(|| Problem::whole("no channel"))?,
+    };
+    let Some(rate_hz) = time.rate_hz else {
+        let words = format!(
+            "times of {}, {} Hz",
+            chosen.one.column,
+            rounded(rate(chosen))
+        );
+        return Ok((Arc::clone(&chosen.times), words));
+    };
+    let (Some(first), Some(last)) = (chosen.times.first(), chosen.times.last()) else {
+        return Err(Problem::whole("the raster's channel has no readings"));
+    };
+    let rows = ((last - first) * rate_hz + 1e-6).floor() + 1.0;
+    if !(rows <= MOST_ROWS) {
+        return Err(Problem::whole(format!(
+            "{rate_hz} Hz over {} s are more rows than {MOST_ROWS:e}",
+            last - first
+        )));
+    }
+    let times = (0..rows as usize)
+        .map(|k| first + k as f64 / rate_hz)
+        .collect();
+    Ok((
+        Arc::new(times),
+        format!(
+            "{rate_hz} Hz from the first to the last reading of {}",
+            chosen.one.column
+        ),
+    ))
+}

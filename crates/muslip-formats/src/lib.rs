@@ -1,0 +1,60 @@
+//! The files that test benches write, as channels.
+//!
+//! [`SourceFile::open`] tells the format by the file's first bytes and lists its channels; [`SourceFile::read`] reads chosen ones as `f64` with
+//! their time and validity. [`map`] and [`roles`] say which channel is which column of a recording, [`units`] brings readings to SI, [`raster`]
+//! brings channels of different rates onto one time, and [`convert`] does it all.
+//!
+//! | feature | format | told by |
+//! | --- | --- | --- |
+//! | `csv` | text: any delimiter, decimal comma, encoding, unit row, preamble | no zero bytes, or a byte-order mark |
+//! | `mdf` | MDF 3 and MDF 4 | `MDF     `, `UnFinMF ` |
+//! | `tdms` | TDMS 1 and 2 | `TDSm` |
+//! | `mat` | MAT v4 to v7 | `MATLAB 5.0`, or a v4 header that fits its file |
+//! | `hdf5` | HDF5 and MAT v7.3 | the HDF5 signature at 0, 512, 1024, ... |
+//! | `parquet` | Parquet | `PAR1` |
+//! | `arrow` | Arrow IPC, which is Feather v2 | `ARROW1` |
+//!
+//! No reader believes a count in a header: what is allocated is bounded by the file's length, or by [`MOST_BYTES`] where it unpacks. What could
+//! not be read is a fault of the source, in words; it is never left out silently.
+#![forbid(unsafe_code)]
+
+#[cfg(feature = "arrow")]
+mod arrow;
+#[cfg(any(feature = "arrow", feature = "parquet"))]
+mod cells;
+pub mod convert;
+#[cfg(feature = "csv")]
+mod csv_text;
+mod error;
+mod file_bytes;
+mod format;
+mod guard;
+#[cfg(feature = "hdf5")]
+mod hdf5;
+pub mod listing;
+pub mod map;
+#[cfg(feature = "mat")]
+mod mat;
+#[cfg(feature = "mdf")]
+mod mdf;
+#[cfg(feature = "mdf")]
+mod mdf_join;
+#[cfg(feature = "parquet")]
+mod parquet;
+pub mod raster;
+pub mod roles;
+mod source;
+#[cfg(feature = "tdms")]
+mod tdms;
+#[cfg(feature = "tdms")]
+mod tdms_scaling;
+mod time_text;
+pub mod units;
+
+pub use error::{FormatError, Place, Problem};
+pub use format::Format;
+pub use guard::quiet_panics;
+pub use source::{Channel, Kind, Series, Source, SourceFile};
+
+/// Most bytes that one block, column or variable may unpack to: 1 GiB.
+pub const MOST_BYTES: u64 = 1 << 30;
