@@ -26,6 +26,7 @@ pub mod convert;
 #[cfg(feature = "csv")]
 mod csv_text;
 mod error;
+mod export;
 mod file_bytes;
 mod format;
 mod guard;
@@ -52,6 +53,7 @@ mod time_text;
 pub mod units;
 
 pub use error::{FormatError, Place, Problem};
+pub use export::write_parquet;
 pub use format::Format;
 pub use guard::quiet_panics;
 pub use source::{Channel, Kind, Series, Source, SourceFile};

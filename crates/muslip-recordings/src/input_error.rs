@@ -129,9 +129,24 @@ pub enum InputProblem {
         /// The model's value.
         expected: String,
     },
+    /// A file of another format that is damaged or not supported, or whose channels cannot be brought to columns.
+    #[error("{0}")]
+    Channels(String),
     /// The usable samples do not hold a curve.
     #[error("no curve: {0}")]
     NoCurve(String),
+}
+
+impl From<muslip_formats::FormatError> for InputError {
+    fn from(error: muslip_formats::FormatError) -> Self {
+        let (line, column) = error.line();
+        Self {
+            problem: InputProblem::Channels(error.problem.in_words()),
+            path: error.path,
+            line,
+            column,
+        }
+    }
 }
 
 /// Puts a cell or a name into a message: quoted, on one line, at most 40 characters of it.

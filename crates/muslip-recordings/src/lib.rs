@@ -1,7 +1,7 @@
 //! The files of a rig, for every program that reads its recordings: CSV recordings, the rig file, the model file
 //! of a diagnosis, and outputs that are whole or absent.
 //!
-//! [`recording`] reads and writes recordings, [`rig_file`] and [`model_file`] the two TOML files, [`load`] hands
+//! [`recording`] reads recordings (CSV, and by `muslip-formats` what other programs write) and writes them, [`map_file`] the map of channels, [`rig_file`] and [`model_file`] the two TOML files, [`load`] hands
 //! recordings to `muslip_diagnose`, [`output`] writes files. What is wrong with an input is an
 //! [`input_error::InputError`]: one line that names file, line and column.
 //!
@@ -28,6 +28,7 @@
 
 pub mod input_error;
 pub mod load;
+pub mod map_file;
 pub mod model_file;
 mod optional;
 pub mod output;

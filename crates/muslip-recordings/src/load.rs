@@ -8,6 +8,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use muslip_diagnose::campaign;
 use muslip_diagnose::outcome::Fault;
+use muslip_formats::map::Map;
 use rayon::prelude::*;
 
 use crate::input_error::{InputError, InputProblem};
@@ -64,7 +65,19 @@ impl Loaded {
 /// [`InputError`] as for [`Recording::open`], [`Recording::rows`] and
 /// [`crate::recording::Rows::next_row`].
 pub fn recording(path: &Path, required: Required) -> Result<Loaded, InputError> {
-    recording_reporting(path, required, &|_| {})
+    recording_mapped(path, required, None)
+}
+
+/// As [`recording`], of a file whose channels a map names.
+///
+/// # Errors
+/// As [`recording`], and [`Recording::open_mapped`].
+pub fn recording_mapped(
+    path: &Path,
+    required: Required,
+    map: Option<&Map>,
+) -> Result<Loaded, InputError> {
+    recording_reporting(path, required, map, &|_| {})
 }
 
 /// As [`recording`], without what had to be mended.
@@ -79,9 +92,23 @@ pub fn run(path: &Path, required: Required) -> Result<campaign::Run, InputError>
 fn recording_reporting(
     path: &Path,
     required: Required,
+    map: Option<&Map>,
     bytes_read: &(dyn Fn(u64) + Sync),
 ) -> Result<Loaded, InputError> {
-    let mut recording = Recording::open(path)?;
+    let mut recording = Recording::open_mapped(path, map)?;
+    let name = path.display().to_string();
+    let converted = recording.converted();
+    let conversion: Vec<Fault> = converted
+        .into_iter()
+        .flat_map(|converted| &converted.faults)
+        .map(|fault| Fault {
+            recording: name.clone(),
+            channel: fault.column.clone(),
+            start_s: fault.start_s,
+            end_s: fault.end_s,
+            what: fault.what.clone(),
+        })
+        .collect();
     let mut rows = recording.rows(required)?;
     let header = rows.header().clone();
     let mut columns: Vec<Vec<f64>> = vec![Vec::new(); header.names().len()];
@@ -92,7 +119,9 @@ fn recording_reporting(
                 for column in &mut columns {
                     column.shrink_to_fit();
                 }
-                return Ok(in_order(path, &header, columns));
+                let mut loaded = in_order(path, &header, columns);
+                loaded.faults.extend(conversion);
+                return Ok(loaded);
             };
             for (column, &value) in columns.iter_mut().zip(row.cells()) {
                 column.push(value);
@@ -244,8 +273,22 @@ pub fn campaign(
     recordings: &[PathBuf],
     progress: &(dyn Fn(f64) + Sync),
 ) -> Result<Campaign, InputError> {
+    campaign_mapped(rig_path, recordings, None, progress)
+}
+
+/// As [`campaign`], of files whose channels the map at a path names, or else the rig file.
+///
+/// # Errors
+/// As [`campaign`]; the map comes after the rig file.
+pub fn campaign_mapped(
+    rig_path: &Path,
+    recordings: &[PathBuf],
+    map_path: Option<&Path>,
+    progress: &(dyn Fn(f64) + Sync),
+) -> Result<Campaign, InputError> {
     refuse_twice(recordings)?;
     let rig = rig(&RigFile::read(rig_path)?);
+    let map = crate::map_file::chosen(map_path, Some(rig_path))?;
     let total: u64 = recordings
         .iter()
         .filter_map(|path| fs::metadata(path).ok())
@@ -258,7 +301,7 @@ pub fn campaign(
     };
     let loaded: Vec<Result<Loaded, InputError>> = recordings
         .par_iter()
-        .map(|path| recording_reporting(path, Required::DragIncluded, &bytes_read))
+        .map(|path| recording_reporting(path, Required::DragIncluded, map.as_ref(), &bytes_read))
         .collect();
     let mut campaign = Campaign {
         rig,

@@ -78,6 +78,29 @@ impl RigFile {
         Self::parse(path, &toml_file::bytes_of(path)?)
     }
 
+    /// A rig of which only the wheel's radius is known, in m: enough for slip and friction. The rest is `NaN`, and the tyre's start that of no
+    /// tyre; nothing that needs them takes such a rig.
+    #[must_use]
+    pub fn of_radius(radius_m: f64) -> Self {
+        Self {
+            wheel: Wheel {
+                radius_m,
+                inertia_kg_m2: f64::NAN,
+            },
+            vehicle: Vehicle {
+                mass_kg: f64::NAN,
+                coasting: false,
+            },
+            brake: None,
+            tyre: Tyre {
+                peak_friction: f64::NAN,
+                critical_slip: f64::NAN,
+                fixed: false,
+            },
+            noise: BTreeMap::new(),
+        }
+    }
+
     /// Checks the text of a rig file; `path` is only named in errors.
     ///
     /// # Errors

@@ -13,8 +13,9 @@ use muslip_report::{FigureFormat, write_figures};
 use rayon::prelude::*;
 use serde_json::json;
 
-use super::estimate::{Choices, Job};
+use super::estimate::{Choices, Job, RigSource};
 use super::failure::Failure;
+use super::mapping::Mapping;
 use super::progress::Progress;
 use super::terminal::Terminal;
 
@@ -31,6 +32,8 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "RIG.toml")]
     rig: PathBuf,
     #[command(flatten)]
+    mapping: Mapping,
+    #[command(flatten)]
     choices: Choices,
     /// Folder for the pages; created if missing.
     #[arg(long, value_name = "DIR")]
@@ -41,7 +44,7 @@ pub(super) struct Arguments {
     /// Print one JSON object and nothing else; the files are written as well.
     #[arg(long)]
     json: bool,
-    /// The recordings (CSV), one file per run.
+    /// The recordings (CSV, or any format that `muslip channels` lists), one file per run.
     #[arg(value_name = "RUN.csv", required = true)]
     recordings: Vec<PathBuf>,
 }
@@ -64,7 +67,8 @@ pub(super) fn run(arguments: &Arguments, terminal: &mut Terminal) -> Result<(), 
         .map(|(recording, page)| {
             let path = staged.path(page);
             let job = Job {
-                rig_path: &arguments.rig,
+                rig: RigSource::File(&arguments.rig),
+                map: arguments.mapping.map.as_deref(),
                 recording_path: recording,
                 options: arguments.choices.options(),
                 model_path: None,
@@ -156,8 +160,9 @@ fn command(arguments: &Arguments) -> String {
         .map(|path| path.display().to_string())
         .collect();
     format!(
-        "muslip campaign --rig {} {}{}",
+        "muslip campaign --rig {} {}{}{}",
         arguments.rig.display(),
+        arguments.mapping.words(),
         arguments.choices.words(),
         recordings.join(" ")
     )

@@ -12,7 +12,7 @@ use muslip_report::diagnose::files;
 use muslip_report::diagnose::summary::{WIDEST_LINE, summary};
 
 use super::diagnose::diagnosed;
-use super::estimate::{Job, tell};
+use super::estimate::{Job, RigSource, tell};
 use super::failure::Failure;
 use super::terminal::Terminal;
 use crate::demo;
@@ -34,7 +34,8 @@ pub(super) fn run(arguments: &Arguments, terminal: &mut Terminal) -> Result<(), 
     write_file(&rig, demo::RIG)?;
     write_file(&recording, demo::RECORDING)?;
     let job = Job {
-        rig_path: &rig,
+        rig: RigSource::File(&rig),
+        map: None,
         recording_path: &recording,
         model_path: None,
         options: EstimateOptions {
@@ -87,7 +88,7 @@ fn find_concealed(folder: &Path, terminal: &mut Terminal) -> Result<(), Failure>
         write_file(&path, contents)?;
         recordings.push(path);
     }
-    let (diagnosis, views) = diagnosed(&rig, &recordings, &found)?;
+    let (diagnosis, views) = diagnosed(&rig, &recordings, None, &found)?;
     let shown: Vec<String> = recordings
         .iter()
         .map(|path| path.display().to_string())

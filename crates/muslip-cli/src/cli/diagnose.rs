@@ -13,6 +13,7 @@ use muslip_report::diagnose::views::Views;
 use muslip_report::{FigureFormat, write_figures};
 
 use super::failure::Failure;
+use super::mapping::Mapping;
 use super::progress::Progress;
 use super::terminal::Terminal;
 
@@ -29,6 +30,8 @@ pub(super) struct Arguments {
     /// Rig file (TOML).
     #[arg(long, value_name = "RIG.toml")]
     rig: PathBuf,
+    #[command(flatten)]
+    mapping: Mapping,
     /// Folder for the three files; created if missing.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
@@ -38,7 +41,7 @@ pub(super) struct Arguments {
     /// Print diagnosis.json and nothing else.
     #[arg(long)]
     json: bool,
-    /// The recordings (CSV), one file per run.
+    /// The recordings (CSV, or any format that `muslip channels` lists), one file per run.
     #[arg(value_name = "RUN.csv", required = true)]
     recordings: Vec<PathBuf>,
 }
@@ -49,7 +52,12 @@ const READING: f64 = 100.0;
 
 pub(super) fn run(arguments: &Arguments, terminal: &mut Terminal) -> Result<(), Failure> {
     let out = &arguments.out;
-    let (diagnosis, views) = diagnosed(&arguments.rig, &arguments.recordings, out)?;
+    let (diagnosis, views) = diagnosed(
+        &arguments.rig,
+        &arguments.recordings,
+        arguments.mapping.map.as_deref(),
+        out,
+    )?;
     let text = files::write(out, &diagnosis, &views, &command(arguments))?;
     if let Some(format) = arguments.format {
         let report = page::report(&diagnosis, &views, "");
@@ -75,6 +83,7 @@ pub(super) fn run(arguments: &Arguments, terminal: &mut Terminal) -> Result<(), 
 pub(super) fn diagnosed(
     rig: &Path,
     recordings: &[PathBuf],
+    map: Option<&Path>,
     out: &Path,
 ) -> Result<(Diagnosis, Views), Failure> {
     let bar = Mutex::new(Progress::new("read", STEPS as u64));
@@ -83,7 +92,7 @@ pub(super) fn diagnosed(
         bar.says(what);
         bar.done(steps as u64);
     };
-    let campaign = load::campaign(rig, recordings, &|share| {
+    let campaign = load::campaign_mapped(rig, recordings, map, &|share| {
         tell("read", READING * share);
     })?;
     files::prepare_folder(out)?;
@@ -100,8 +109,9 @@ fn command(arguments: &Arguments) -> String {
         .map(|path| shown(path))
         .collect();
     format!(
-        "muslip diagnose --rig {} {}",
+        "muslip diagnose --rig {} {}{}",
         shown(&arguments.rig),
+        arguments.mapping.words(),
         recordings.join(" ")
     )
 }

@@ -15,10 +15,12 @@ use muslip_analysis::wording::{
 use muslip_recordings::model_file::ModelFile;
 use muslip_recordings::output::{OutputError, OutputFile, write_file};
 use muslip_recordings::recording::Recording;
-use muslip_recordings::rig_file::RigFile;
+use muslip_recordings::map_file;
+use muslip_recordings::rig_file::{LARGEST_RADIUS_M, RigFile, SMALLEST_RADIUS_M};
 use muslip_report::{CurveLabel, FigureFormat, of_estimate, write_figures};
 
 use super::failure::Failure;
+use super::mapping::Mapping;
 use super::progress::Progress;
 use super::terminal::Terminal;
 
@@ -33,13 +35,19 @@ const PRINTED: &str = "-";
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  \
 muslip estimate --rig rig.toml run.csv\n  \
+muslip estimate --radius 0.31 run.mf4\n  \
 muslip estimate --rig rig.toml --report run.html run.csv\n  \
 muslip estimate --rig rig.toml --trace trace.csv --json run.csv\n  \
 muslip estimate --rig rig.toml --model found/model.toml run.csv")]
 pub(super) struct Arguments {
     /// Rig file (TOML).
     #[arg(long, value_name = "RIG.toml")]
-    rig: PathBuf,
+    rig: Option<PathBuf>,
+    /// Free-rolling radius of the wheel in m, in place of a rig file: slip and friction need nothing else of it.
+    #[arg(long, value_name = "METRES", conflicts_with = "rig")]
+    radius: Option<f64>,
+    #[command(flatten)]
+    mapping: Mapping,
     #[command(flatten)]
     choices: Choices,
     /// Compensate the effects that a diagnosis found, sample by sample: the `model.toml` that `diagnose`
@@ -60,7 +68,7 @@ pub(super) struct Arguments {
     /// Print one JSON object and nothing else.
     #[arg(long)]
     json: bool,
-    /// The recording (CSV).
+    /// The recording (CSV, or any format that `muslip channels` lists).
     #[arg(value_name = "RUN.csv")]
     recording: PathBuf,
 }
@@ -134,8 +142,18 @@ pub(super) fn run(arguments: &Arguments, terminal: &mut Terminal) -> Result<(), 
             "--trace - and --json both write to standard output: give --trace a file name".into(),
         ));
     }
+    let rig = match (&arguments.rig, arguments.radius) {
+        (Some(path), _) => RigSource::File(path),
+        (None, Some(radius_m)) => RigSource::Radius(radius_m),
+        (None, None) => {
+            return Err(Failure::Usage(
+                "the wheel's radius is not known: add --radius METRES (or --rig RIG.toml)".into(),
+            ));
+        }
+    };
     let job = Job {
-        rig_path: &arguments.rig,
+        rig,
+        map: arguments.mapping.map.as_deref(),
         recording_path: &arguments.recording,
         options: arguments.choices.options(),
         model_path: arguments.model.as_deref(),
@@ -144,12 +162,16 @@ pub(super) fn run(arguments: &Arguments, terminal: &mut Terminal) -> Result<(), 
         format: arguments.format,
         beside: None,
     };
-    let result = job.run()?;
+    let (result, notes) = job.run_noting()?;
     if trace_is_printed {
         return Ok(());
     }
     if arguments.json {
-        return terminal.json(&result.to_json());
+        let mut json = result.to_json();
+        if let (false, Some(object)) = (notes.is_empty(), json.as_object_mut()) {
+            object.insert("read".into(), notes.into());
+        }
+        return terminal.json(&json);
     }
     terminal.headline(&format!(
         "{}: {}",
@@ -158,15 +180,60 @@ pub(super) fn run(arguments: &Arguments, terminal: &mut Terminal) -> Result<(), 
     ))?;
     terminal.line("")?;
     tell(&result, terminal)?;
+    if !notes.is_empty() {
+        terminal.line("")?;
+    }
+    for note in &notes {
+        terminal.line(note)?;
+    }
     for path in [&arguments.trace, &arguments.report].into_iter().flatten() {
         terminal.line(&format!("Written: {}", path.display()))?;
     }
     Ok(())
 }
 
+/// Where the wheel's radius is from.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum RigSource<'a> {
+    /// A rig file.
+    File(&'a Path),
+    /// `--radius`, in m.
+    Radius(f64),
+}
+
+impl RigSource<'_> {
+    fn path(&self) -> Option<&Path> {
+        match self {
+            Self::File(path) => Some(path),
+            Self::Radius(_) => None,
+        }
+    }
+
+    fn read(&self) -> Result<RigFile, Failure> {
+        match *self {
+            Self::File(path) => Ok(RigFile::read(path)?),
+            Self::Radius(radius_m) if (SMALLEST_RADIUS_M..=LARGEST_RADIUS_M).contains(&radius_m) => {
+                Ok(RigFile::of_radius(radius_m))
+            }
+            Self::Radius(radius_m) => Err(Failure::Usage(format!(
+                "--radius {radius_m}: must be between {SMALLEST_RADIUS_M} and {LARGEST_RADIUS_M} m"
+            ))),
+        }
+    }
+
+    /// The option as it was given.
+    fn words(&self) -> String {
+        match self {
+            Self::File(path) => format!("--rig {}", path.display()),
+            Self::Radius(radius_m) => format!("--radius {radius_m}"),
+        }
+    }
+}
+
 /// An estimate with its files; the demo runs one too.
 pub(super) struct Job<'a> {
-    pub(super) rig_path: &'a Path,
+    pub(super) rig: RigSource<'a>,
+    pub(super) map: Option<&'a Path>,
     pub(super) recording_path: &'a Path,
     pub(super) options: EstimateOptions,
     pub(super) model_path: Option<&'a Path>,
@@ -178,9 +245,14 @@ pub(super) struct Job<'a> {
 
 impl Job<'_> {
     pub(super) fn run(&self) -> Result<EstimateResult, Failure> {
+        self.run_noting().map(|(result, _)| result)
+    }
+
+    /// As [`Job::run`], with what was done to read a file of another format.
+    fn run_noting(&self) -> Result<(EstimateResult, Vec<String>), Failure> {
         let bytes = 2 * Recording::announced_length_bytes(self.recording_path)?;
         let mut progress = Progress::bytes("estimate", bytes);
-        self.run_reporting(&mut |bytes| progress.done(bytes))
+        self.run_all(&mut |bytes| progress.done(bytes))
     }
 
     /// As [`Job::run`]; `progress` receives the bytes read so far, of twice the recording's length.
@@ -188,16 +260,29 @@ impl Job<'_> {
         &self,
         progress: &mut dyn FnMut(u64),
     ) -> Result<EstimateResult, Failure> {
-        let rig = RigFile::read(self.rig_path)?;
-        let model = match self.model_path {
-            Some(path) => {
+        self.run_all(progress).map(|(result, _)| result)
+    }
+
+    fn run_all(
+        &self,
+        progress: &mut dyn FnMut(u64),
+    ) -> Result<(EstimateResult, Vec<String>), Failure> {
+        let rig = self.rig.read()?;
+        let model = match (self.model_path, self.rig.path()) {
+            (Some(path), Some(rig_path)) => {
                 let model = ModelFile::read(path)?;
-                model.check_rig(self.rig_path, &rig)?;
+                model.check_rig(rig_path, &rig)?;
                 Some(model.repaired)
             }
-            None => None,
+            (Some(_), None) => {
+                return Err(Failure::Usage(
+                    "--model is of a rig: add --rig RIG.toml in place of --radius".into(),
+                ));
+            }
+            (None, _) => None,
         };
-        let mut recording = Recording::open(self.recording_path)?;
+        let map = map_file::chosen(self.map, self.rig.path())?;
+        let mut recording = Recording::open_mapped(self.recording_path, map.as_ref())?;
         // Outputs are begun before the work, so that a folder that is not there is told at once.
         let report = self.report.map(OutputFile::create).transpose()?;
         drop(report);
@@ -235,7 +320,7 @@ impl Job<'_> {
                 write_figures(&figures_folder(path), figures, format)?;
             }
         }
-        Ok(result)
+        Ok((result, recording.notes().to_vec()))
     }
 
     fn failure(&self, error: EstimateError) -> Failure {
@@ -254,9 +339,12 @@ impl Job<'_> {
             Some(path) => format!("--model {} ", path.display()),
             None => String::new(),
         };
+        let map = self
+            .map
+            .map_or(String::new(), |map| format!("--map {} ", map.display()));
         format!(
-            "muslip estimate --rig {} --range {} --estimator {} {model}{}",
-            self.rig_path.display(),
+            "muslip estimate {} --range {} --estimator {} {model}{map}{}",
+            self.rig.words(),
             range_word(result.range),
             result.estimator.word(),
             self.recording_path.display()

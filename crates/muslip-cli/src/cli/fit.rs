@@ -10,6 +10,7 @@ use muslip_recordings::recording::Recording;
 use muslip_recordings::rig_file::RigFile;
 
 use super::failure::Failure;
+use super::mapping::Mapping;
 use super::progress::Progress;
 use super::terminal::Terminal;
 
@@ -24,22 +25,25 @@ pub(super) struct Arguments {
     /// Rig file (TOML).
     #[arg(long, value_name = "RIG.toml")]
     rig: PathBuf,
+    #[command(flatten)]
+    mapping: Mapping,
     /// Maximum number of iterations (accepted steps).
     #[arg(long, value_name = "N", default_value_t = DEFAULT_MAXIMUM_ITERATIONS)]
     max_iterations: usize,
     /// Print one JSON object and nothing else.
     #[arg(long)]
     json: bool,
-    /// The recordings (CSV), fitted together.
+    /// The recordings (CSV, or any format that `muslip channels` lists), fitted together.
     #[arg(value_name = "RUN.csv", required = true)]
     recordings: Vec<PathBuf>,
 }
 
 pub(super) fn run(arguments: &Arguments, terminal: &mut Terminal) -> Result<(), Failure> {
     let rig = RigFile::read(&arguments.rig)?;
+    let map = arguments.mapping.chosen(Some(&arguments.rig))?;
     let mut recordings = Vec::with_capacity(arguments.recordings.len());
     for path in &arguments.recordings {
-        recordings.push(Recording::open(path)?);
+        recordings.push(Recording::open_mapped(path, map.as_ref())?);
     }
     let bytes: u64 = recordings.iter().map(Recording::length_bytes).sum();
     let mut progress = Progress::bytes("fit", 2 * bytes);

@@ -4,13 +4,16 @@
 //! standard error. Whoever reads standard output may stop at any time: that ends the command quietly.
 
 mod campaign;
+mod channels;
 mod completions;
+mod convert;
 mod demo;
 mod diagnose;
 mod estimate;
 mod explain;
 mod failure;
 mod fit;
+mod mapping;
 mod predict;
 mod progress;
 mod rig;
@@ -43,6 +46,8 @@ struct Arguments {
 #[derive(Debug, Subcommand)]
 enum Command {
     Estimate(estimate::Arguments),
+    Channels(channels::Arguments),
+    Convert(convert::Arguments),
     Campaign(campaign::Arguments),
     Fit(fit::Arguments),
     Diagnose(diagnose::Arguments),
@@ -60,9 +65,13 @@ pub fn main() -> ExitCode {
         Ok(arguments) => arguments,
         Err(error) => return usage(&error),
     };
+    // A library that gives up on a damaged file is one line about the file, as everything else is.
+    muslip_formats::quiet_panics();
     let mut terminal = Terminal::new();
     let outcome = match arguments.command {
         Command::Estimate(arguments) => estimate::run(&arguments, &mut terminal),
+        Command::Channels(arguments) => channels::run(&arguments, &mut terminal),
+        Command::Convert(arguments) => convert::run(&arguments, &mut terminal),
         Command::Campaign(arguments) => campaign::run(&arguments, &mut terminal),
         Command::Fit(arguments) => fit::run(&arguments, &mut terminal),
         Command::Diagnose(arguments) => diagnose::run(&arguments, &mut terminal),

@@ -14,6 +14,7 @@ use muslip_recordings::rig_file::RigFile;
 use serde::Serialize;
 
 use super::failure::Failure;
+use super::mapping::Mapping;
 use super::terminal::Terminal;
 
 /// Predict the drag reading of a recording from its other columns with a repaired model.
@@ -34,6 +35,8 @@ pub(super) struct Arguments {
     /// Rig file (TOML); radius, inertia, mass and brake must equal the model's.
     #[arg(long, value_name = "RIG.toml")]
     rig: PathBuf,
+    #[command(flatten)]
+    mapping: Mapping,
     /// Repaired model, as `diagnose` writes it.
     #[arg(long, value_name = "MODEL.toml")]
     model: PathBuf,
@@ -48,7 +51,7 @@ pub(super) struct Arguments {
     /// recordings.
     #[arg(long, conflicts_with_all = ["out", "base"])]
     score: bool,
-    /// The recording (CSV); several with --score.
+    /// The recording (CSV, or any format that `muslip channels` lists); several with --score.
     #[arg(value_name = "RUN.csv", required = true)]
     recordings: Vec<PathBuf>,
 }
@@ -67,13 +70,14 @@ pub(super) fn run(arguments: &Arguments, terminal: &mut Terminal) -> Result<(), 
     let rig = RigFile::read(&arguments.rig)?;
     let model = ModelFile::read(&arguments.model)?;
     model.check_rig(&arguments.rig, &rig)?;
+    let map = arguments.mapping.chosen(Some(&arguments.rig))?;
     let unusable =
         |error: RepairedError| Failure::Usage(format!("{}: {error}", arguments.model.display()));
     if arguments.score {
         let runs = arguments
             .recordings
             .iter()
-            .map(|path| load::run(path, Required::DragIncluded))
+            .map(|path| load::recording_mapped(path, Required::DragIncluded, map.as_ref()).map(|loaded| loaded.run))
             .collect::<Result<Vec<_>, _>>()?;
         let score = Score {
             schema: "muslip.score/1",
@@ -91,7 +95,7 @@ pub(super) fn run(arguments: &Arguments, terminal: &mut Terminal) -> Result<(), 
         ));
     };
     let out: &Path = arguments.out.as_deref().unwrap_or(Path::new(""));
-    let loaded = load::recording(recording, Required::DragOptional)?;
+    let loaded = load::recording_mapped(recording, Required::DragOptional, map.as_ref())?;
     let which = if arguments.base {
         Which::Base
     } else {

@@ -13,6 +13,7 @@ use muslip_recordings::rig_file::{self, RigFile};
 
 use super::failure::Failure;
 use super::progress::Progress;
+use super::mapping::Mapping;
 use super::terminal::Terminal;
 
 /// Simulate a run of the rig and write the recording.
@@ -43,6 +44,8 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "RUN.csv", requires = "model",
         conflicts_with_all = ["speed", "normal_force", "applications", "duration", "rate_hz"])]
     inputs: Option<PathBuf>,
+    #[command(flatten)]
+    mapping: Mapping,
     /// Simulate sensors without noise.
     #[arg(long)]
     no_noise: bool,
@@ -244,7 +247,11 @@ fn replayed(
     inputs: &Path,
     terminal: &mut Terminal,
 ) -> Result<(), Failure> {
-    let loaded = load::recording(inputs, Required::DragOptional)?;
+    let loaded = load::recording_mapped(
+        inputs,
+        Required::DragOptional,
+        arguments.mapping.chosen(arguments.rig.as_deref())?.as_ref(),
+    )?;
     let seed = (!arguments.no_noise).then_some(arguments.seed);
     let replay = replay(model, &loaded, seed).map_err(|error| match error {
         ReplayError::Model(error) => of_file(model.path(), &error),

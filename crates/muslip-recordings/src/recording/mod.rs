@@ -1,4 +1,4 @@
-//! Recordings: the CSV files that rigs write, one run each.
+//! Recordings: the CSV files that rigs write, one run each, and files of other formats that become such when they are opened.
 //!
 //! [`Recording`] reads row by row in bounded memory, as often as needed; [`Run`] holds a whole run by
 //! column; [`RecordingWriter`] writes one. Lines that start with `#` are comments, an empty cell or
@@ -8,6 +8,7 @@ mod header;
 mod position;
 mod reader;
 mod run;
+mod table;
 mod utf8;
 mod writer;
 

@@ -6,9 +6,11 @@ use std::path::{Path, PathBuf};
 
 use csv::ByteRecord;
 use muslip::sample::RigSample;
+use muslip_formats::map::Map;
 
 use super::header::{Channel, Header, Required};
 use super::position::{Place, line_and_column};
+use super::table::Table;
 use super::utf8::{NotUtf8At, Utf8Reader};
 use crate::input_error::{InputError, InputProblem, quoted, shown};
 
@@ -22,15 +24,26 @@ pub struct Recording {
     /// Where the text starts: after the byte order mark, if there is one.
     text_start: u64,
     length_bytes: u64,
+    /// The columns, where the file is in another format than the contract's.
+    table: Option<Table>,
 }
 
 impl Recording {
-    /// Opens a recording. What comes through a pipe is first copied to an unnamed temporary file,
+    /// Opens a recording: a CSV with the contract's columns, or a file of any other format whose channels are told by their names and units.
+    ///
+    /// # Errors
+    /// As [`Recording::open_mapped`].
+    pub fn open(path: &Path) -> Result<Self, InputError> {
+        Self::open_mapped(path, None)
+    }
+
+    /// Opens a recording whose channels a map names. A CSV with the contract's columns needs none; with one it is read by it. What comes through a pipe is first copied to an unnamed temporary file,
     /// because most jobs read it twice.
     ///
     /// # Errors
-    /// [`InputError`] if there is no such file or it cannot be read.
-    pub fn open(path: &Path) -> Result<Self, InputError> {
+    /// [`InputError`] if there is no such file, it cannot be read, or its channels cannot be brought to columns: as
+    /// [`muslip_formats::convert::convert`].
+    pub fn open_mapped(path: &Path, map: Option<&Map>) -> Result<Self, InputError> {
         let fail = |error| InputError::unreadable(path, &error);
         let mut file = File::open(path).map_err(fail)?;
         let metadata = file.metadata().map_err(fail)?;
@@ -51,12 +64,26 @@ impl Recording {
             .take(BYTE_ORDER_MARK.len() as u64)
             .read_to_end(&mut start)
             .map_err(fail)?;
+        let text_start = if start == BYTE_ORDER_MARK { 3 } else { 0 };
+        let table = Table::of(path, &file, text_start, map)?;
         Ok(Self {
             path: path.to_owned(),
-            text_start: if start == BYTE_ORDER_MARK { 3 } else { 0 },
+            text_start,
             file,
             length_bytes,
+            table,
         })
+    }
+
+    /// What was read, converted, interpolated, decimated or dropped to get the columns from a file of another format; empty for a CSV of the
+    /// contract.
+    pub fn notes(&self) -> &[String] {
+        self.table.as_ref().map_or(&[], |table| &table.converted.notes)
+    }
+
+    /// How the columns were made of a file of another format.
+    pub fn converted(&self) -> Option<&muslip_formats::convert::Converted> {
+        self.table.as_ref().map(|table| &table.converted)
     }
 
     /// Size of a recording before it is opened, for progress bars: of a pipe, which can be opened only
@@ -90,6 +117,18 @@ impl Recording {
     /// [`InputError`] if the file is empty or its header lacks a required column, has one twice, or one
     /// without a name.
     pub fn rows(&mut self, required: Required) -> Result<Rows<'_>, InputError> {
+        if let Some(table) = &self.table {
+            table.has(&self.path, required)?;
+            let header = table.header.clone();
+            return Ok(Rows {
+                recording: self,
+                cells: vec![f64::NAN; header.names().len()],
+                header,
+                pass: Pass::Table(table),
+                rows_read: 0,
+                last_time_s: f64::NEG_INFINITY,
+            });
+        }
         self.rewind()?;
         let text = Utf8Reader::new(&self.file);
         let mut csv = csv::ReaderBuilder::new()
@@ -107,10 +146,9 @@ impl Recording {
         let header = self.header(&record, required)?;
         Ok(Rows {
             recording: self,
-            csv,
+            pass: Pass::Text(Box::new(csv), record),
             cells: vec![f64::NAN; header.names().len()],
             header,
-            record,
             rows_read: 0,
             last_time_s: f64::NEG_INFINITY,
         })
@@ -182,13 +220,19 @@ impl Recording {
     }
 }
 
+/// Where the rows come from.
+#[derive(Debug)]
+enum Pass<'a> {
+    Text(Box<csv::Reader<Utf8Reader<&'a File>>>, ByteRecord),
+    Table(&'a Table),
+}
+
 /// One pass over the rows of a recording.
 #[derive(Debug)]
 pub struct Rows<'a> {
     recording: &'a Recording,
-    csv: csv::Reader<Utf8Reader<&'a File>>,
+    pass: Pass<'a>,
     header: Header,
-    record: ByteRecord,
     cells: Vec<f64>,
     rows_read: u64,
     last_time_s: f64,
@@ -202,7 +246,13 @@ impl Rows<'_> {
 
     /// Bytes of the file gone through so far, for progress bars.
     pub fn bytes_read(&self) -> u64 {
-        self.csv.get_ref().bytes_passed()
+        match &self.pass {
+            Pass::Text(csv, _) => csv.get_ref().bytes_passed(),
+            Pass::Table(table) => {
+                let share = self.rows_read as f64 / table.rows().max(1) as f64;
+                (self.recording.length_bytes as f64 * share) as u64
+            }
+        }
     }
 
     /// Reads the next row; `None` after the last one.
@@ -211,7 +261,24 @@ impl Rows<'_> {
     /// [`InputError`] with line and column: a row with too many or too few cells, a cell that is no
     /// number, bytes that are not UTF-8, a time that repeats or goes back, or no row at all.
     pub fn next_row(&mut self) -> Result<Option<Row<'_>>, InputError> {
-        match self.csv.read_byte_record(&mut self.record) {
+        let (csv, record) = match &mut self.pass {
+            Pass::Text(csv, record) => (csv, record),
+            Pass::Table(table) => {
+                let row = usize::try_from(self.rows_read).unwrap_or(usize::MAX);
+                if row >= table.rows() {
+                    return Ok(None);
+                }
+                for (cell, column) in self.cells.iter_mut().zip(&table.converted.columns) {
+                    *cell = column.get(row).copied().unwrap_or(f64::NAN);
+                }
+                self.rows_read += 1;
+                return Ok(Some(Row {
+                    header: &self.header,
+                    cells: &self.cells,
+                }));
+            }
+        };
+        match csv.read_byte_record(record) {
             Ok(true) => {}
             Ok(false) if self.rows_read == 0 => {
                 return Err(self
@@ -222,14 +289,15 @@ impl Rows<'_> {
             Err(error) => return Err(self.recording.read_failure(error)),
         }
         self.rows_read += 1;
-        let (expected, found) = (self.cells.len(), self.record.len());
+        let (expected, found) = (self.cells.len(), record.len());
         if expected != found {
             return Err(self.error(
                 expected.min(found),
                 InputProblem::CellCount { expected, found },
             ));
         }
-        for (index, (cell, value)) in self.record.iter().zip(&mut self.cells).enumerate() {
+        let mut stray = None;
+        for (index, (cell, value)) in record.iter().zip(&mut self.cells).enumerate() {
             match parse_cell(cell) {
                 Some(number) => *value = number,
                 None => {
@@ -237,9 +305,13 @@ impl Rows<'_> {
                         column: self.header.names().get(index).cloned().unwrap_or_default(),
                         cell: quoted(&String::from_utf8_lossy(cell)),
                     };
-                    return Err(self.error(index, problem));
+                    stray = Some((index, problem));
+                    break;
                 }
             }
+        }
+        if let Some((index, problem)) = stray {
+            return Err(self.error(index, problem));
         }
         self.check_time()?;
         Ok(Some(Row {
@@ -272,7 +344,10 @@ impl Rows<'_> {
     }
 
     fn error(&self, cell: usize, problem: InputProblem) -> InputError {
-        let record_from = self.record.position().map_or(0, csv::Position::byte);
+        let record_from = match &self.pass {
+            Pass::Text(_, record) => record.position().map_or(0, csv::Position::byte),
+            Pass::Table(_) => 0,
+        };
         self.recording.error_at_cell(record_from, cell, problem)
     }
 }

@@ -1,0 +1,146 @@
+//! `muslip channels`.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use muslip_formats::listing::{Listed, listed};
+use muslip_formats::{SourceFile, roles};
+use muslip_recordings::map_file;
+use muslip_recordings::output::write_file;
+use muslip_recordings::input_error::InputError;
+use serde_json::json;
+
+use super::failure::Failure;
+use super::terminal::Terminal;
+
+/// List the channels of a file: group, name, unit, rate, samples, times, invalid readings, and what column each would be.
+///
+/// Reads MDF 3 and 4, TDMS, MAT v4 to v7.3, HDF5, Parquet, Arrow, Feather v2 and CSV of any dialect; the format is told by the file's bytes. Damage
+/// is listed, and what can be read whole is read.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:\n  \
+muslip channels run.mf4\n  \
+muslip channels run.mf4 --write-map map.toml\n  \
+muslip channels run.mf4 --map map.toml --json | jq '.channels[] | select(.role)'")]
+pub(super) struct Arguments {
+    /// Map of channels (TOML), to see what it finds.
+    #[arg(long, value_name = "MAP.toml")]
+    map: Option<PathBuf>,
+    /// Write the roles that were found, or guessed, as a map to go on from.
+    #[arg(long, value_name = "MAP.toml")]
+    write_map: Option<PathBuf>,
+    /// Print one JSON object and nothing else.
+    #[arg(long)]
+    json: bool,
+    /// The file.
+    #[arg(value_name = "FILE")]
+    file: PathBuf,
+}
+
+pub(super) fn run(arguments: &Arguments, terminal: &mut Terminal) -> Result<(), Failure> {
+    let map = arguments.map.as_deref().map(map_file::read).transpose()?;
+    let mut file = SourceFile::open(&arguments.file).map_err(InputError::from)?;
+    // What a map or a guess cannot find concerns the other commands; here it is listed.
+    let mut faults = Vec::new();
+    let roles = match map.as_ref().map(|map| roles::by_map(file.channels(), map)) {
+        Some(Ok(roles)) => roles,
+        Some(Err(problem)) => {
+            faults.push(problem.in_words());
+            roles::Roles::default()
+        }
+        None => roles::guess(file.channels()),
+    };
+    let (channels, told) = listed(&mut file, &roles);
+    faults.splice(0..0, told);
+    if let Some(path) = &arguments.write_map {
+        let time = map.map(|map| map.time).unwrap_or_default();
+        let mut text = roles.as_map(file.channels(), &time).to_toml();
+        for (_, reason) in roles.refused.iter().filter(|_| roles.guessed) {
+            text.push_str(&format!("# {reason}\n"));
+        }
+        write_file(path, text.as_bytes())?;
+    }
+    if arguments.json {
+        return terminal.json(&json!({
+            "schema": "muslip.channels/1",
+            "format": file.format().word(),
+            "start_time": file.start_time(),
+            "channels": channels.iter().map(as_json).collect::<Vec<_>>(),
+            "faults": faults,
+        }));
+    }
+    let start = file.start_time().map_or(String::new(), |start| format!(", started {start}"));
+    let count = channels.len();
+    terminal.headline(&format!("{}: {}{start}, {count} channels", arguments.file.display(), file.format().word()))?;
+    terminal.line("")?;
+    table(&channels, terminal)?;
+    for fault in &faults {
+        terminal.line(&format!("fault: {fault}"))?;
+    }
+    if roles.guessed {
+        terminal.line("")?;
+        terminal.line("Columns are guessed from names and units; --write-map map.toml saves the guess.")?;
+        for (_, reason) in &roles.refused {
+            terminal.paragraph(reason)?;
+        }
+    }
+    if let Some(path) = &arguments.write_map {
+        terminal.line(&format!("Written: {}", path.display()))?;
+    }
+    Ok(())
+}
+
+fn as_json(one: &Listed) -> serde_json::Value {
+    let channel = &one.channel;
+    let mut value = json!({
+        "group": channel.group,
+        "name": channel.name,
+        "unit": channel.unit,
+        "samples": one.samples,
+        "first_s": one.first_s,
+        "last_s": one.last_s,
+        "rate_hz": one.rate_hz,
+        "invalid": one.invalid,
+        "comment": channel.comment,
+        "kind": channel.kind.word(),
+    });
+    if let (Some(role), Some(object)) = (&one.role, value.as_object_mut()) {
+        object.insert("role".into(), json!(role));
+    }
+    value
+}
+
+/// One row a channel, under a header.
+fn table(channels: &[Listed], terminal: &mut Terminal) -> Result<(), Failure> {
+    let number = |value: Option<f64>| value.map_or(String::new(), |value| format!("{}", (value * 1e6).round() / 1e6));
+    let mut rows = vec![["group", "name", "unit", "Hz", "samples", "from s", "to s", "invalid", "kind", "column", "comment"].map(str::to_owned).to_vec()];
+    for one in channels {
+        let channel = &one.channel;
+        rows.push(vec![
+            channel.group.clone(),
+            channel.name.clone(),
+            channel.unit.clone(),
+            number(one.rate_hz),
+            one.samples.to_string(),
+            number(one.first_s),
+            number(one.last_s),
+            one.invalid.to_string(),
+            channel.kind.word().to_owned(),
+            one.role.clone().unwrap_or_default(),
+            channel.comment.clone(),
+        ]);
+    }
+    let shown: Vec<Vec<String>> = rows
+        .iter()
+        .map(|row| row.iter().map(|cell| muslip_recordings::input_error::one_line(cell).chars().take(40).collect()).collect())
+        .collect();
+    let columns = shown.first().map_or(0, Vec::len);
+    let widths: Vec<usize> = (0..columns)
+        .map(|column| shown.iter().filter_map(|row| row.get(column)).map(|cell: &String| cell.chars().count()).max().unwrap_or(0))
+        .collect();
+    for row in &shown {
+        let line: Vec<String> = row.iter().zip(&widths).map(|(cell, &width)| format!("{cell:<width$}")).collect();
+        terminal.line(line.join("  ").trim_end())?;
+    }
+    Ok(())
+}
