@@ -3,10 +3,8 @@
 //! A vector of numbers is a channel in the group of its path; of a table (compound type) each field of numbers is one. The columns of a matrix that is
 //! taller than wide are channels of their own (in MAT v7.3, whose matrices lie transposed, its rows). The unit is the attribute `unit` or `units`.
 
-use hdf5_reader::{
-    Attribute, ByteOrder, Dataset, Datatype, FileStorage, Hdf5File, OpenOptions,
-};
 use hdf5_reader::group::Group;
+use hdf5_reader::{Attribute, ByteOrder, Dataset, Datatype, FileStorage, Hdf5File, OpenOptions};
 use std::sync::Arc;
 
 use crate::MOST_BYTES;

@@ -376,7 +376,16 @@ impl MatSource {
             .unwrap_or(u64::MAX);
         match class {
             2 => {
-                return self.structure(&mut cursor, base, variable, big, group, &name, count, depth);
+                return self.structure(
+                    &mut cursor,
+                    base,
+                    variable,
+                    big,
+                    group,
+                    &name,
+                    count,
+                    depth,
+                );
             }
             6..=15 => {}
             1 => {

@@ -14,6 +14,8 @@ use crate::time_text::rfc3339;
 
 /// Seconds from 1904-01-01, the format's epoch, to 1970-01-01.
 const EPOCH_S: i64 = 2_082_844_800;
+/// Bytes fetched at a time.
+const PIECE: u64 = 1 << 22;
 /// Most metadata that a segment may have, in bytes.
 const MOST_METADATA: u64 = 1 << 28;
 
@@ -90,7 +92,19 @@ struct Scaler {
     /// Byte in the row, and the bit in it for a digital line.
     byte: u64,
     bit: Option<u32>,
+    /// A time stamp of 16 bytes.
+    time: bool,
     id: u32,
+}
+
+impl Scaler {
+    fn size(&self) -> u64 {
+        if self.time {
+            16
+        } else {
+            self.number.size() as u64
+        }
+    }
 }
 
 /// How a channel's values lie in a chunk.
@@ -114,6 +128,9 @@ struct Run {
     big: bool,
     bit: Option<u32>,
     time: bool,
+    /// The same again, so many times in all, each so many bytes after the other.
+    chunks: u64,
+    chunk: u64,
 }
 
 #[derive(Debug, Clone, Default)]
@@ -124,6 +141,8 @@ struct Object {
     runs: BTreeMap<Option<u32>, Vec<Run>>,
     samples: u64,
     raw: Option<Raw>,
+    /// Why its data cannot be placed.
+    unsupported: Option<String>,
 }
 
 /// A TDMS file.
@@ -244,45 +263,66 @@ impl TdmsSource {
         let Some(runs) = object.runs.get(&scaler) else {
             return Err(Problem::whole("it has no raw values"));
         };
-        let total: u64 = runs.iter().map(|run| run.count).sum();
-        // Every run lies in the file, and a stride has a byte at least: no more values than bytes.
-        let mut values =
-            Vec::with_capacity(usize::try_from(total.min(self.file.length())).unwrap_or(0));
+        let mut values = Vec::new();
         let mut first_time = None;
         for run in runs {
-            /// Bytes fetched at a time.
-            const PIECE: u64 = 1 << 22;
-            let size = if run.time {
-                16
+            let size = run.size();
+            // The runs of several chunks at once where they are small, a part of a run where it is large.
+            let span = (run.count - 1) * run.stride + size;
+            let together = if span > PIECE {
+                1
             } else {
-                run.number.size() as u64
+                (PIECE / run.chunk.max(1)).max(1)
             };
-            let rows = (PIECE / run.stride.max(1)).max(1);
-            let mut row = 0;
-            while row < run.count {
-                let now = rows.min(run.count - row);
-                let bytes = self
-                    .file
-                    .exact(run.offset + row * run.stride, (now - 1) * run.stride + size)?;
-                for k in 0..now {
-                    let from = usize::try_from(k * run.stride).unwrap_or(usize::MAX);
-                    let cell = bytes.get(from..).unwrap_or_default();
-                    values.push(if run.time {
-                        let (seconds, fraction) = timestamp(cell, run.big);
-                        let first = *first_time.get_or_insert(seconds);
-                        (seconds - first) as f64 + fraction as f64 / 18_446_744_073_709_551_616.0
-                    } else {
-                        let value = run.number.read(cell, run.big);
-                        match run.bit {
-                            Some(bit) => f64::from(u8::from((value as u64) >> bit & 1 == 1)),
-                            None => value,
-                        }
-                    });
+            let rows = if span > PIECE {
+                (PIECE / run.stride.max(1)).max(1)
+            } else {
+                run.count
+            };
+            let mut chunk = 0;
+            while chunk < run.chunks {
+                let chunks = together.min(run.chunks - chunk);
+                let mut row = 0;
+                while row < run.count {
+                    let now = rows.min(run.count - row);
+                    let start = run.offset + chunk * run.chunk + row * run.stride;
+                    let length = (chunks - 1) * run.chunk + (now - 1) * run.stride + size;
+                    let bytes = self.file.exact(start, length)?;
+                    for (c, k) in (0..chunks).flat_map(|c| (0..now).map(move |k| (c, k))) {
+                        let from = usize::try_from(c * run.chunk + k * run.stride);
+                        let cell = bytes.get(from.unwrap_or(usize::MAX)..).unwrap_or_default();
+                        values.push(run.value(cell, &mut first_time));
+                    }
+                    row += now;
                 }
-                row += now;
+                chunk += chunks;
             }
         }
         Ok(values)
+    }
+}
+
+impl Run {
+    fn size(&self) -> u64 {
+        if self.time {
+            16
+        } else {
+            self.number.size() as u64
+        }
+    }
+
+    fn value(&self, cell: &[u8], first_time: &mut Option<i64>) -> f64 {
+        if self.time {
+            let (seconds, fraction) = timestamp(cell, self.big);
+            let first = *first_time.get_or_insert(seconds);
+            let whole = seconds.wrapping_sub(first) as f64;
+            return whole + fraction as f64 / 18_446_744_073_709_551_616.0;
+        }
+        let value = self.number.read(cell, self.big);
+        match self.bit {
+            Some(bit) => f64::from(u8::from((value as u64) >> bit & 1 == 1)),
+            None => value,
+        }
     }
 }
 
@@ -446,8 +486,14 @@ fn objects_of(
                     daqmx(&mut cursor, index != 0x0000_1269).ok_or_else(|| torn(&cursor))?;
                 let object = &mut objects.all[place].1;
                 object.raw = Some(raw);
-                object.layout =
-                    Some(layout.map_err(|problem| Problem::of(&path, problem.in_words()))?);
+                object.layout = match layout {
+                    Ok(layout) => Some(layout),
+                    // Matters only where data follow.
+                    Err(problem) => {
+                        object.unsupported = Some(problem.in_words());
+                        None
+                    }
+                };
                 true
             }
             _ => {
@@ -557,7 +603,7 @@ fn daqmx(cursor: &mut Cursor<'_>, digital: bool) -> Option<DaqmxLayout> {
             6 => Number::U64,
             7 => Number::I64,
             8 => Number::F32,
-            9 => Number::F64,
+            9 | 0xffff_ffff => Number::F64,
             _ => {
                 problem = Some(format!("DAQmx type {code} is not supported"));
                 Number::U8
@@ -568,6 +614,7 @@ fn daqmx(cursor: &mut Cursor<'_>, digital: bool) -> Option<DaqmxLayout> {
             buffer: usize::try_from(buffer).ok()?,
             byte: if digital { offset / 8 } else { offset },
             bit: digital.then_some((offset % 8) as u32),
+            time: code == 0xffff_ffff,
             id,
         });
     }
@@ -610,6 +657,13 @@ fn place_data(
     faults: &mut Vec<String>,
 ) -> Result<(), Problem> {
     let big = contents & BIG_ENDIAN != 0;
+    for (place, _) in active.iter().filter(|(_, has_data)| *has_data) {
+        if let Some((path, object)) = objects.all.get(*place)
+            && let (None, Some(reason)) = (&object.layout, &object.unsupported)
+        {
+            return Err(Problem::of(path, reason.clone()));
+        }
+    }
     let layouts: Vec<(usize, Layout)> = active
         .iter()
         .filter(|(_, has_data)| *has_data)
@@ -651,7 +705,7 @@ fn place_data(
                         "a DAQmx scaler names a buffer that is not there",
                     ));
                 };
-                if scaler.byte + scaler.number.size() as u64 > *width {
+                if scaler.byte + scaler.size() > *width {
                     return Err(Problem::at_byte(at, "a DAQmx scaler lies outside its row"));
                 }
                 *rows = (*rows).max(layout.values);
@@ -685,6 +739,8 @@ fn place_data(
     let mut from = data;
     let rest = (end - data) % chunk;
     while from < end {
+        // All whole chunks at once, then the rest.
+        let chunks = ((end - from) / chunk).max(1);
         let there = chunk.min(end - from);
         if there < chunk && !open {
             faults.push(format!(
@@ -716,7 +772,9 @@ fn place_data(
                                 number: scaler.number,
                                 big,
                                 bit: scaler.bit,
-                                time: false,
+                                time: scaler.time,
+                                chunks,
+                                chunk,
                             },
                         );
                     }
@@ -725,7 +783,7 @@ fn place_data(
                         .first()
                         .is_some_and(|scaler| scaler.buffer == buffer)
                     {
-                        objects.all[*place].1.samples += layout.values.min(whole_rows);
+                        objects.all[*place].1.samples += layout.values.min(whole_rows) * chunks;
                     }
                 }
                 offset += whole;
@@ -737,18 +795,26 @@ fn place_data(
                     let rows = there.checked_div(row).unwrap_or(0);
                     (from + column, row, layout.values.min(rows))
                 } else {
-                    let room = (from + there).saturating_sub(offset);
+                    // A closed segment with too little data has less of each channel, an open one ends where it was cut off.
                     let count = if size == 0 {
                         layout.values
+                    } else if there < chunk && !open {
+                        share(layout.values, there, chunk)
                     } else {
+                        let room = (from + there).saturating_sub(offset);
                         layout.values.min(room / size)
                     };
                     (offset, size, count)
                 };
                 column += size;
-                offset = offset.saturating_add(bytes(layout).unwrap_or(0));
+                let taken = if size == 0 {
+                    bytes(layout).unwrap_or(0)
+                } else {
+                    count * size
+                };
+                offset = offset.saturating_add(taken);
                 let object = &mut objects.all[*place].1;
-                object.samples = object.samples.saturating_add(count);
+                object.samples = object.samples.saturating_add(count.saturating_mul(chunks));
                 let number = match layout.raw {
                     Raw::Number(number) => number,
                     Raw::Bool => Number::U8,
@@ -766,13 +832,21 @@ fn place_data(
                         big,
                         bit: None,
                         time: layout.raw == Raw::Time,
+                        chunks,
+                        chunk,
                     },
                 );
             }
         }
-        from += there;
+        from += there * chunks;
     }
     Ok(())
+}
+
+/// The part of `values` that `there` of `chunk` bytes hold.
+fn share(values: u64, there: u64, chunk: u64) -> u64 {
+    let share = u128::from(values) * u128::from(there) / u128::from(chunk.max(1));
+    u64::try_from(share).unwrap_or(values)
 }
 
 /// Adds a run; one that goes on where the last of the same stride ended is one with it.
@@ -786,6 +860,8 @@ fn push(object: &mut Object, scaler: Option<u32>, run: Run) {
         && last.number == run.number
         && last.big == run.big
         && last.bit == run.bit
+        && last.chunks == 1
+        && run.chunks == 1
         && last.offset + last.count * last.stride == run.offset
     {
         last.count += run.count;

@@ -16,7 +16,8 @@ pub fn read(path: &Path) -> Result<Map, InputError> {
     let bytes = toml_file::bytes_of(path)?;
     let text = toml_file::text_of(path, &bytes)?;
     let map: Map = toml_file::parsed(path, text)?;
-    map.check().map_err(|reason| InputError::whole_file(path, InputProblem::Toml(reason)))?;
+    map.check()
+        .map_err(|reason| InputError::whole_file(path, InputProblem::Toml(reason)))?;
     Ok(map)
 }
 

@@ -5,9 +5,10 @@ use std::path::PathBuf;
 use clap::Args;
 use muslip_formats::listing::{Listed, listed};
 use muslip_formats::{SourceFile, roles};
+use muslip_recordings::input_error::InputError;
 use muslip_recordings::map_file;
 use muslip_recordings::output::write_file;
-use muslip_recordings::input_error::InputError;
+use muslip_recordings::recording::Required;
 use serde_json::json;
 
 use super::failure::Failure;
@@ -55,7 +56,7 @@ pub(super) fn run(arguments: &Arguments, terminal: &mut Terminal) -> Result<(), 
     if let Some(path) = &arguments.write_map {
         let time = map.map(|map| map.time).unwrap_or_default();
         let mut text = roles.as_map(file.channels(), &time).to_toml();
-        for (_, reason) in roles.refused.iter().filter(|_| roles.guessed) {
+        for (_, reason) in needed(&roles).filter(|_| roles.guessed) {
             text.push_str(&format!("# {reason}\n"));
         }
         write_file(path, text.as_bytes())?;
@@ -69,9 +70,15 @@ pub(super) fn run(arguments: &Arguments, terminal: &mut Terminal) -> Result<(), 
             "faults": faults,
         }));
     }
-    let start = file.start_time().map_or(String::new(), |start| format!(", started {start}"));
+    let start = file
+        .start_time()
+        .map_or(String::new(), |start| format!(", started {start}"));
     let count = channels.len();
-    terminal.headline(&format!("{}: {}{start}, {count} channels", arguments.file.display(), file.format().word()))?;
+    terminal.headline(&format!(
+        "{}: {}{start}, {count} channels",
+        arguments.file.display(),
+        file.format().word()
+    ))?;
     terminal.line("")?;
     table(&channels, terminal)?;
     for fault in &faults {
@@ -79,8 +86,10 @@ pub(super) fn run(arguments: &Arguments, terminal: &mut Terminal) -> Result<(), 
     }
     if roles.guessed {
         terminal.line("")?;
-        terminal.line("Columns are guessed from names and units; --write-map map.toml saves the guess.")?;
-        for (_, reason) in &roles.refused {
+        terminal.line(
+            "Columns are guessed from names and units; --write-map map.toml saves the guess.",
+        )?;
+        for (_, reason) in needed(&roles) {
             terminal.paragraph(reason)?;
         }
     }
@@ -88,6 +97,20 @@ pub(super) fn run(arguments: &Arguments, terminal: &mut Terminal) -> Result<(), 
         terminal.line(&format!("Written: {}", path.display()))?;
     }
     Ok(())
+}
+
+/// The columns that an estimate cannot do without and no channel became.
+fn needed(roles: &roles::Roles) -> impl Iterator<Item = &(&'static str, String)> {
+    let is_needed = |name: &str| {
+        Required::DragIncluded
+            .channels()
+            .skip(1)
+            .any(|channel| channel.name() == name)
+    };
+    roles
+        .refused
+        .iter()
+        .filter(move |(role, _)| is_needed(role))
 }
 
 fn as_json(one: &Listed) -> serde_json::Value {
@@ -112,8 +135,19 @@ fn as_json(one: &Listed) -> serde_json::Value {
 
 /// One row a channel, under a header.
 fn table(channels: &[Listed], terminal: &mut Terminal) -> Result<(), Failure> {
-    let number = |value: Option<f64>| value.map_or(String::new(), |value| format!("{}", (value * 1e6).round() / 1e6));
-    let mut rows = vec![["group", "name", "unit", "Hz", "samples", "from s", "to s", "invalid", "kind", "column", "comment"].map(str::to_owned).to_vec()];
+    let number = |value: Option<f64>| {
+        value.map_or(String::new(), |value| {
+            format!("{}", (value * 1e6).round() / 1e6)
+        })
+    };
+    let mut rows = vec![
+        [
+            "group", "name", "unit", "Hz", "samples", "from s", "to s", "invalid", "kind",
+            "column", "comment",
+        ]
+        .map(str::to_owned)
+        .to_vec(),
+    ];
     for one in channels {
         let channel = &one.channel;
         rows.push(vec![
@@ -132,14 +166,34 @@ fn table(channels: &[Listed], terminal: &mut Terminal) -> Result<(), Failure> {
     }
     let shown: Vec<Vec<String>> = rows
         .iter()
-        .map(|row| row.iter().map(|cell| muslip_recordings::input_error::one_line(cell).chars().take(40).collect()).collect())
+        .map(|row| {
+            row.iter()
+                .map(|cell| {
+                    muslip_recordings::input_error::one_line(cell)
+                        .chars()
+                        .take(40)
+                        .collect()
+                })
+                .collect()
+        })
         .collect();
     let columns = shown.first().map_or(0, Vec::len);
     let widths: Vec<usize> = (0..columns)
-        .map(|column| shown.iter().filter_map(|row| row.get(column)).map(|cell: &String| cell.chars().count()).max().unwrap_or(0))
+        .map(|column| {
+            shown
+                .iter()
+                .filter_map(|row| row.get(column))
+                .map(|cell: &String| cell.chars().count())
+                .max()
+                .unwrap_or(0)
+        })
         .collect();
     for row in &shown {
-        let line: Vec<String> = row.iter().zip(&widths).map(|(cell, &width)| format!("{cell:<width$}")).collect();
+        let line: Vec<String> = row
+            .iter()
+            .zip(&widths)
+            .map(|(cell, &width)| format!("{cell:<width$}"))
+            .collect();
         terminal.line(line.join("  ").trim_end())?;
     }
     Ok(())

@@ -4,8 +4,8 @@ use std::io::Write as _;
 use std::path::PathBuf;
 
 use clap::Args;
-use muslip_formats::convert::{Converted, convert};
 use muslip_formats::SourceFile;
+use muslip_formats::convert::{Converted, convert};
 use muslip_recordings::input_error::{InputError, InputProblem};
 use muslip_recordings::output::{OutputError, OutputFile};
 use muslip_recordings::recording::{Recording, RecordingWriter, Required};
@@ -49,9 +49,14 @@ pub(super) fn run(arguments: &Arguments, terminal: &mut Terminal) -> Result<(), 
     let mut file = SourceFile::open(&arguments.file).map_err(InputError::from)?;
     let converted = convert(&mut file, map.as_ref()).map_err(InputError::from)?;
     if converted.guessed {
-        let missing = Required::DragIncluded.channels().find(|channel| !converted.names.iter().any(|name| name == channel.name()));
+        let missing = Required::DragIncluded
+            .channels()
+            .find(|channel| !converted.names.iter().any(|name| name == channel.name()));
         if let Some(channel) = missing {
-            let refused = converted.refused.iter().find(|(role, _)| *role == channel.name());
+            let refused = converted
+                .refused
+                .iter()
+                .find(|(role, _)| *role == channel.name());
             let problem = match refused {
                 Some((_, reason)) => InputProblem::Channels(reason.clone()),
                 None => InputProblem::MissingColumn(channel.name()),
@@ -62,7 +67,10 @@ pub(super) fn run(arguments: &Arguments, terminal: &mut Terminal) -> Result<(), 
     let out = &arguments.out;
     let fail = |error| OutputError::new(out, error);
     let mut sink = OutputFile::create(out)?;
-    if out.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("parquet")) {
+    if out
+        .extension()
+        .is_some_and(|extension| extension.eq_ignore_ascii_case("parquet"))
+    {
         muslip_formats::write_parquet(&mut sink, &converted).map_err(fail)?;
     } else {
         write_csv(&mut sink, &converted).map_err(fail)?;
@@ -70,7 +78,11 @@ pub(super) fn run(arguments: &Arguments, terminal: &mut Terminal) -> Result<(), 
     sink.flush().map_err(fail)?;
     sink.commit()?;
     let rows = converted.columns.first().map_or(0, Vec::len);
-    terminal.headline(&format!("{}: {rows} rows of {}", out.display(), converted.names.join(", ")))?;
+    terminal.headline(&format!(
+        "{}: {rows} rows of {}",
+        out.display(),
+        converted.names.join(", ")
+    ))?;
     for note in &converted.notes {
         terminal.line(&format!("  {note}"))?;
     }
@@ -85,7 +97,12 @@ fn write_csv(sink: &mut OutputFile, converted: &Converted) -> std::io::Result<()
     let mut row = Vec::with_capacity(names.len());
     for k in 0..rows {
         row.clear();
-        row.extend(converted.columns.iter().map(|column| column.get(k).copied().unwrap_or(f64::NAN)));
+        row.extend(
+            converted
+                .columns
+                .iter()
+                .map(|column| column.get(k).copied().unwrap_or(f64::NAN)),
+        );
         writer.row(&row)?;
     }
     Ok(())

@@ -12,10 +12,10 @@ use muslip_analysis::estimate::{
 use muslip_analysis::wording::{
     consistency_sentence, estimate_sentence, model_sentences, noise_sentence,
 };
+use muslip_recordings::map_file;
 use muslip_recordings::model_file::ModelFile;
 use muslip_recordings::output::{OutputError, OutputFile, write_file};
 use muslip_recordings::recording::Recording;
-use muslip_recordings::map_file;
 use muslip_recordings::rig_file::{LARGEST_RADIUS_M, RigFile, SMALLEST_RADIUS_M};
 use muslip_report::{CurveLabel, FigureFormat, of_estimate, write_figures};
 
@@ -212,7 +212,9 @@ impl RigSource<'_> {
     fn read(&self) -> Result<RigFile, Failure> {
         match *self {
             Self::File(path) => Ok(RigFile::read(path)?),
-            Self::Radius(radius_m) if (SMALLEST_RADIUS_M..=LARGEST_RADIUS_M).contains(&radius_m) => {
+            Self::Radius(radius_m)
+                if (SMALLEST_RADIUS_M..=LARGEST_RADIUS_M).contains(&radius_m) =>
+            {
                 Ok(RigFile::of_radius(radius_m))
             }
             Self::Radius(radius_m) => Err(Failure::Usage(format!(

@@ -77,7 +77,10 @@ pub(super) fn run(arguments: &Arguments, terminal: &mut Terminal) -> Result<(), 
         let runs = arguments
             .recordings
             .iter()
-            .map(|path| load::recording_mapped(path, Required::DragIncluded, map.as_ref()).map(|loaded| loaded.run))
+            .map(|path| {
+                load::recording_mapped(path, Required::DragIncluded, map.as_ref())
+                    .map(|loaded| loaded.run)
+            })
             .collect::<Result<Vec<_>, _>>()?;
         let score = Score {
             schema: "muslip.score/1",

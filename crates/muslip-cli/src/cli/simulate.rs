@@ -12,8 +12,8 @@ use muslip_recordings::recording::{Channel, RecordingWriter, Required};
 use muslip_recordings::rig_file::{self, RigFile};
 
 use super::failure::Failure;
-use super::progress::Progress;
 use super::mapping::Mapping;
+use super::progress::Progress;
 use super::terminal::Terminal;
 
 /// Simulate a run of the rig and write the recording.

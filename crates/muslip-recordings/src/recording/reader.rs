@@ -78,7 +78,9 @@ impl Recording {
     /// What was read, converted, interpolated, decimated or dropped to get the columns from a file of another format; empty for a CSV of the
     /// contract.
     pub fn notes(&self) -> &[String] {
-        self.table.as_ref().map_or(&[], |table| &table.converted.notes)
+        self.table
+            .as_ref()
+            .map_or(&[], |table| &table.converted.notes)
     }
 
     /// How the columns were made of a file of another format.

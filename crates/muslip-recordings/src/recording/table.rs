@@ -23,7 +23,12 @@ pub(super) struct Table {
 
 impl Table {
     /// The columns of a file; `None` for a CSV of the contract, which is read row by row and tells what is wrong with it by line and column.
-    pub(super) fn of(path: &Path, file: &File, text_start: u64, map: Option<&Map>) -> Result<Option<Self>, InputError> {
+    pub(super) fn of(
+        path: &Path,
+        file: &File,
+        text_start: u64,
+        map: Option<&Map>,
+    ) -> Result<Option<Self>, InputError> {
         let fail = |error| InputError::unreadable(path, &error);
         let head = head(file).map_err(fail)?;
         let text = head.get(text_start as usize..).unwrap_or_default();
@@ -52,8 +57,15 @@ impl Table {
     /// An error where a column that the work needs was not found.
     pub(super) fn has(&self, path: &Path, required: Required) -> Result<(), InputError> {
         let fail = |problem| Err(InputError::whole_file(path, problem));
-        for channel in required.channels().filter(|&channel| self.header.index(channel).is_none()) {
-            let refused = self.converted.refused.iter().find(|(role, _)| *role == channel.name());
+        for channel in required
+            .channels()
+            .filter(|&channel| self.header.index(channel).is_none())
+        {
+            let refused = self
+                .converted
+                .refused
+                .iter()
+                .find(|(role, _)| *role == channel.name());
             return fail(match refused {
                 Some((_, reason)) => InputProblem::Channels(reason.clone()),
                 None => InputProblem::MissingColumn(channel.name()),
@@ -81,8 +93,13 @@ fn is_contract(text: &[u8]) -> bool {
     header.is_some_and(|header| {
         header.split(|&byte| byte == b',').any(|cell| {
             let cell = cell.trim_ascii();
-            let cell = cell.strip_prefix(b"\"").and_then(|cell| cell.strip_suffix(b"\"")).unwrap_or(cell);
-            Channel::ALL.iter().any(|channel| channel.name().as_bytes() == cell.trim_ascii())
+            let cell = cell
+                .strip_prefix(b"\"")
+                .and_then(|cell| cell.strip_suffix(b"\""))
+                .unwrap_or(cell);
+            Channel::ALL
+                .iter()
+                .any(|channel| channel.name().as_bytes() == cell.trim_ascii())
         })
     })
 }
