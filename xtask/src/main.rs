@@ -6,6 +6,7 @@ mod cycles;
 mod estimators;
 mod figures;
 mod firmware;
+mod formats;
 mod image;
 mod latency;
 mod mechanisms;
@@ -74,6 +75,12 @@ enum Command {
         #[arg(long, value_name = "PYTHON")]
         python: Option<String>,
     },
+    /// Write files with the programs that the field uses, and hold the readers against them and against damage.
+    Formats {
+        /// Damaged files a format; 10,000 where it is not given, as in the tests.
+        #[arg(long)]
+        mutations: Option<u64>,
+    },
     /// Write the field guide, docs/mechanisms.md with its pictures, from what the mechanisms say of themselves.
     Mechanisms,
     /// Compile the core to WebAssembly for the pages' what-if, into crates/muslip-report/what-if.
@@ -105,6 +112,7 @@ fn main() -> anyhow::Result<()> {
     match Arguments::parse().command {
         Command::Test => test::run_all(),
         Command::Check => check::run_all(),
+        Command::Formats { mutations } => formats::test(mutations),
         Command::Firmware => firmware::budgets(),
         Command::Pil {
             seconds,

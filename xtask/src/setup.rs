@@ -56,6 +56,18 @@ const CYCLES_TOOLS: &[Tool] = &[
     },
 ];
 
+/// Programs that write the files of other formats.
+const FORMATS_TOOLS: &[Tool] = &[Tool {
+    program: "python3",
+    package: "python3-venv",
+    needed_for: "the files that the readers are held against",
+}];
+
+/// As [`run_all`], for `cargo xtask formats`.
+pub fn for_formats() -> Result<()> {
+    Machine::this().tools(FORMATS_TOOLS)
+}
+
 /// As [`run_all`], for `cargo xtask cycles`.
 pub fn for_cycles() -> Result<()> {
     Machine::this().set_up(CYCLES_TOOLS)

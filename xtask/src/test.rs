@@ -7,6 +7,7 @@ use anyhow::{Context, Result, bail};
 
 use crate::cycles;
 use crate::firmware;
+use crate::formats;
 use crate::setup::{self, TARGETS};
 use crate::step::{CHECKED, cargo, run, step};
 use crate::trial;
@@ -40,20 +41,21 @@ pub fn run_all() -> Result<()> {
 
     what_if::check()?;
 
+    let files = formats::write()?;
+
     // The long ones too: a test is ignored by `cargo test` because it is long, and for no other reason.
-    let workspace = tests(
-        "tests of the workspace",
-        cargo(&[
-            "test",
-            "--workspace",
-            "--profile",
-            CHECKED,
-            "--locked",
-            "--no-fail-fast",
-            "--",
-            "--include-ignored",
-        ]),
-    )?;
+    let mut workspace = cargo(&[
+        "test",
+        "--workspace",
+        "--profile",
+        CHECKED,
+        "--locked",
+        "--no-fail-fast",
+        "--",
+        "--include-ignored",
+    ]);
+    workspace.env(formats::FILES, files);
+    let workspace = tests("tests of the workspace", workspace)?;
 
     // These exist only with the feature on.
     let features = tests(

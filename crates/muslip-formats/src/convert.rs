@@ -561,7 +561,7 @@ fn grid(ready: &[Ready], time: &crate::map::Time) -> Result<(Arc<Vec<f64>>, Stri
         return Err(Problem::whole("the raster's channel has no readings"));
     };
     let rows = ((last - first) * rate_hz + 1e-6).floor() + 1.0;
-    if !(rows <= MOST_ROWS) {
+    if rows.is_nan() || rows > MOST_ROWS {
         return Err(Problem::whole(format!(
             "{rate_hz} Hz over {} s are more rows than {MOST_ROWS:e}",
             last - first

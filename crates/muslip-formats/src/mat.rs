@@ -63,8 +63,8 @@ impl MatSource {
             unpacked: None,
         };
         match head.get(124..128) {
-            Some([0 | 1, 0 | 1 | 2, b'I', b'M']) => source.five(false)?,
-            Some([0 | 1 | 2, 0 | 1, b'M', b'I']) => source.five(true)?,
+            Some([0 | 1, 0..=2, b'I', b'M']) => source.five(false)?,
+            Some([0..=2, 0 | 1, b'M', b'I']) => source.five(true)?,
             _ => source.four()?,
         }
         if source.channels.is_empty() && !source.faults.is_empty() {

@@ -158,7 +158,7 @@ pub(crate) fn mended4(file: FileBytes) -> Result<Mended, Problem> {
             ));
         }
         // Blocks start at multiples of eight.
-        while (length + added.len() as u64) % 8 != 0 {
+        while !(length + added.len() as u64).is_multiple_of(8) {
             added.push(0);
         }
         let place = length + added.len() as u64;

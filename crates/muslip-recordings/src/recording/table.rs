@@ -57,15 +57,12 @@ impl Table {
     /// An error where a column that the work needs was not found.
     pub(super) fn has(&self, path: &Path, required: Required) -> Result<(), InputError> {
         let fail = |problem| Err(InputError::whole_file(path, problem));
-        for channel in required
+        let missing = required
             .channels()
-            .filter(|&channel| self.header.index(channel).is_none())
-        {
-            let refused = self
-                .converted
-                .refused
-                .iter()
-                .find(|(role, _)| *role == channel.name());
+            .find(|&channel| self.header.index(channel).is_none());
+        if let Some(channel) = missing {
+            let mut refused = self.converted.refused.iter();
+            let refused = refused.find(|(role, _)| *role == channel.name());
             return fail(match refused {
                 Some((_, reason)) => InputProblem::Channels(reason.clone()),
                 None => InputProblem::MissingColumn(channel.name()),
