@@ -8,7 +8,7 @@ use muslip_formats::SourceFile;
 use muslip_formats::convert::{Converted, convert};
 use muslip_recordings::input_error::{InputError, InputProblem};
 use muslip_recordings::output::{OutputError, OutputFile};
-use muslip_recordings::recording::{Recording, RecordingWriter, Required};
+use muslip_recordings::recording::{RecordingWriter, Required};
 
 use super::failure::Failure;
 use super::mapping::Mapping;
