@@ -103,7 +103,7 @@ def unsorted_mdf():
         if k % 2 == 0:
             stream += b"\2" + struct.pack("<di", k * 0.001, b[k // 2])
 
-    def build(version, cut=0):
+    def build(version, cut=0, alone=False):
         out = bytearray(64)
         places = {}
 
@@ -136,7 +136,14 @@ def unsorted_mdf():
         x = channel("x", 0, 0, 4, 8, 64, "km/h", 0)
         t1 = channel("t1", 2, 1, 4, 0, 64, "s", x)
         second = group(2, 1500, 12, t2, 0)
-        first = group(1, 3000, 16, t1, second)
+        first = group(1, 3000, 16, t1, 0 if alone else second)
+        if alone:
+            dg = put("DG", block(b"##DG", [0, first, 0, 0], struct.pack("<B7x", 0)))
+            records = b"".join(struct.pack("<dd", k * 0.001, a[k]) for k in range(3000))
+            at = put("DT", block(b"##DT", [], records))
+            struct.pack_into("<Q", out, dg + 24 + 16, at)
+            struct.pack_into("<Q", out, head + 24, dg)
+            return bytes(out)
         dg = put("DG", block(b"##DG", [0, first, 0, 0], struct.pack("<B7x", 1)))
         pieces = [stream[k:k + 1000] for k in range(0, len(stream), 1000)]
         list_at = put("DL", block(b"##DL", [0] * (1 + len(pieces)), struct.pack("<BxxxI", 1, len(pieces)) + struct.pack("<Q", 1000)))
@@ -152,6 +159,12 @@ def unsorted_mdf():
         name = f"unsorted-{version}.mf4"
         (OUT / name).write_bytes(build(version))
         expect(name, [("0", "x", a, times, "km/h", []), ("1", "y", b, times[::2], "N", [])], faults=version == "4.30")
+    # A sorted file with its records last, as recorders write it, cut off within them.
+    sorted_file = build("4.10", alone=True)
+    (OUT / "sorted.mf4").write_bytes(sorted_file)
+    expect("sorted.mf4", [("0", "x", a, times, "km/h", [])])
+    (OUT / "sorted-cut.mf4").write_bytes(sorted_file[:-16 * 1000 - 5])
+    expect("sorted-cut.mf4", [("0", "x", a[:1999], times[:1999], "km/h", [])], faults=True)
     cut = 1024 * 20
     (OUT / "unsorted-cut.mf4").write_bytes(build("4.10", cut))
     # What is left before the cut: as many whole records as the whole blocks and the rest of the cut one hold.

@@ -2,7 +2,10 @@
 
 use crate::raster;
 use crate::roles::Roles;
-use crate::source::{Channel, SourceFile};
+use crate::source::{Channel, Series, SourceFile};
+
+/// Channels that are read at once.
+const AT_ONCE: usize = 8;
 
 /// A channel with the figures of its readings.
 #[derive(Debug, Clone, PartialEq)]
@@ -25,7 +28,7 @@ pub struct Listed {
 
 /// Reads every channel once, one after the other, and tells of each; a channel that cannot be read is listed with a fault.
 ///
-/// Memory: the readings of one channel at a time.
+/// Memory: the readings of eight channels at a time.
 pub fn listed(file: &mut SourceFile, roles: &Roles) -> (Vec<Listed>, Vec<String>) {
     let channels = file.channels().to_vec();
     let mut faults = Vec::new();
@@ -41,6 +44,11 @@ pub fn listed(file: &mut SourceFile, roles: &Roles) -> (Vec<Listed>, Vec<String>
                 .collect::<Vec<f64>>()
         })
     });
+    let numeric: Vec<usize> = (0..channels.len())
+        .filter(|&k| channels[k].kind.is_number())
+        .collect();
+    // Some at a time: a text file is gone through once for each reading of it.
+    let mut read: Vec<(usize, Series)> = Vec::new();
     let mut all = Vec::with_capacity(channels.len());
     for (k, channel) in channels.into_iter().enumerate() {
         let mut one = Listed {
@@ -53,7 +61,19 @@ pub fn listed(file: &mut SourceFile, roles: &Roles) -> (Vec<Listed>, Vec<String>
             channel,
         };
         if one.channel.kind.is_number() {
-            match file.read(&[k]).map(|mut series| series.pop()) {
+            if !read.iter().any(|(which, _)| *which == k) {
+                let from = numeric.partition_point(|&which| which < k);
+                let some = &numeric[from..(from + AT_ONCE).min(numeric.len())];
+                // Where one of them cannot be read each is tried by itself.
+                let series = file.read(some).unwrap_or_default();
+                read = some.iter().copied().zip(series).collect();
+            }
+            let place = read.iter().position(|(which, _)| *which == k);
+            let series = match place {
+                Some(place) => Ok(Some(read.swap_remove(place).1)),
+                None => file.read(&[k]).map(|mut series| series.pop()),
+            };
+            match series {
                 Ok(Some(series)) => {
                     one.samples = series.values.len() as u64;
                     one.invalid = series.invalid_count();

@@ -2,7 +2,8 @@
 //!
 //! It loses records of an unsorted group that straddle two data blocks, and says nothing: the blocks of such a group are joined into one, which lies
 //! behind the end of the file. It refuses versions after 4.20 that differ only in what is not read here: the version is told as 4.20. It refuses a
-//! version 3 file that was cut off: its counts are lowered to what is there. Everything else is read as it lies.
+//! version 4 file with a link into what was cut off: the link is taken out, and what it led to is told as lost. It refuses a version 3 file that was
+//! cut off: its counts are lowered to what is there. Everything else is read as it lies.
 
 use std::collections::{HashMap, HashSet};
 use std::io::Read;
@@ -40,6 +41,9 @@ impl ByteSource for Patched {
     }
 
     fn read_bytes(&self, offset: u64, len: usize) -> MdfResult<ByteSlice<'_>> {
+        if len == 0 {
+            return Ok(ByteSlice::Borrowed(&[]));
+        }
         let end = offset
             .checked_add(len as u64)
             .filter(|&end| end <= self.len());
@@ -131,14 +135,28 @@ pub(crate) fn mended4(file: FileBytes) -> Result<Mended, Problem> {
         .and_then(|(links, _)| links.first().copied())
         .unwrap_or(0);
     let mut seen = HashSet::new();
+    // Where the link to the next data group is: it is cut where what it leads to is not there.
+    let mut link_at = 64 + 24;
     while next != 0 && seen.len() < LONGEST_CHAIN && seen.insert(next) {
         let at = next;
         let Some((links, data)) = block(&file, at, b"##DG") else {
+            faults.push(format!(
+                "byte {at}: a data group is damaged or cut off: it and those behind it are not read"
+            ));
+            replaced.push((link_at, 0_u64.to_le_bytes().to_vec()));
             break;
         };
         let link = |k: usize| links.get(k).copied().unwrap_or(0);
         next = link(0);
         let mut group = link(1);
+        if !is_whole(&file, group) {
+            faults.push(format!(
+                "byte {at}: the channels of a data group are damaged or cut off: it is not read"
+            ));
+            replaced.push((link_at, next.to_le_bytes().to_vec()));
+            continue;
+        }
+        link_at = at + 24;
         while group != 0 && seen.len() < LONGEST_CHAIN && seen.insert(group) {
             let Some((links, data)) = block(&file, group, b"##CG") else {
                 break;
@@ -147,10 +165,15 @@ pub(crate) fn mended4(file: FileBytes) -> Result<Mended, Problem> {
             group = links.first().copied().unwrap_or(0);
         }
         let has_ids = data.first().is_some_and(|&size| size > 0);
-        if !has_ids || !is_list(&file, link(2)) {
+        let records = link(2);
+        if let Some(there) = cut_short(&file, records) {
+            faults.push(format!("byte {records}: records are cut off"));
+            replaced.push((records + 8, there.to_le_bytes().to_vec()));
+        }
+        if !is_list(&file, records) || !(has_ids || !is_list_whole(&file, records)) {
             continue;
         }
-        let stream = joined(&file, link(2), &mut faults)?;
+        let stream = joined(&file, records, &mut faults)?;
         if added.len() as u64 + stream.len() as u64 > MOST_BYTES {
             return Err(Problem::at_byte(
                 at,
@@ -178,6 +201,62 @@ pub(crate) fn mended4(file: FileBytes) -> Result<Mended, Problem> {
         announced,
         faults,
     })
+}
+
+/// Whether a channel group and all its channels can be read.
+fn is_whole(file: &FileBytes, group: u64) -> bool {
+    let Some((links, _)) = block(file, group, b"##CG") else {
+        return false;
+    };
+    let mut channel = links.get(1).copied().unwrap_or(0);
+    let mut seen = HashSet::new();
+    while channel != 0 && seen.insert(channel) {
+        let Some((links, _)) = block(file, channel, b"##CN") else {
+            return false;
+        };
+        // Text of name and unit.
+        let texts = [2, 6].map(|k| links.get(k).copied().unwrap_or(0));
+        let is_there =
+            |at: u64| at == 0 || end_of(file, at).is_some_and(|end| end <= file.length());
+        if !texts.into_iter().all(is_there) {
+            return false;
+        }
+        channel = links.first().copied().unwrap_or(0);
+    }
+    true
+}
+
+/// Where a block says that it ends.
+fn end_of(file: &FileBytes, at: u64) -> Option<u64> {
+    let head = file.exact(at, 24).ok()?;
+    at.checked_add(le64(&head, 8))
+}
+
+/// The length of a plain block of records that ends with the file instead of where it says.
+fn cut_short(file: &FileBytes, at: u64) -> Option<u64> {
+    let head = file.exact(at, 24).ok().filter(|_| at != 0)?;
+    let end = end_of(file, at).filter(|&end| end > file.length());
+    (&head[..4] == b"##DT" && end.is_some()).then(|| file.length() - at)
+}
+
+/// Whether every block of a list is there as long as it says.
+fn is_list_whole(file: &FileBytes, at: u64) -> bool {
+    let mut list = match block(file, at, b"##HL") {
+        Some((links, _)) => links.first().copied().unwrap_or(0),
+        None => at,
+    };
+    let mut seen = HashSet::new();
+    while list != 0 && seen.insert(list) {
+        let Some((links, _)) = block(file, list, b"##DL") else {
+            return false;
+        };
+        let mut data = links.iter().skip(1).filter(|&&data| data != 0);
+        if !data.all(|&data| end_of(file, data).is_some_and(|end| end <= file.length())) {
+            return false;
+        }
+        list = links.first().copied().unwrap_or(0);
+    }
+    true
 }
 
 fn is_list(file: &FileBytes, at: u64) -> bool {
