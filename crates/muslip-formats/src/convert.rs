@@ -72,9 +72,14 @@ pub fn convert(file: &mut SourceFile, map: Option<&Map>) -> Result<Converted, Fo
     let fail = |problem: Problem| problem.in_file(&path);
     let channels = file.channels().to_vec();
     let named = map.filter(|map| !map.channels.is_empty());
-    let roles = match named {
+    let mut roles = match named {
         Some(map) => roles::by_map(&channels, map).map_err(fail)?,
         None => roles::guess(&channels),
+    };
+    let left_out = if roles.guessed {
+        drop_unusable(&mut roles, &channels)
+    } else {
+        Vec::new()
     };
     if roles.assigned.is_empty() {
         let told: Vec<&str> = roles
@@ -89,7 +94,8 @@ pub fn convert(file: &mut SourceFile, map: Option<&Map>) -> Result<Converted, Fo
         )));
     }
     let time = map.map(|map| map.time.clone()).unwrap_or_default();
-    let (ready, faults, keeps_time) = read(file, &channels, &roles)?;
+    let (ready, mut faults, keeps_time) = read(file, &channels, &roles)?;
+    faults.extend(left_out);
     let first_s = ready
         .iter()
         .filter_map(|one| one.times.first())
@@ -143,6 +149,32 @@ pub fn convert(file: &mut SourceFile, map: Option<&Map>) -> Result<Converted, Fo
         }
     }
     Ok(out)
+}
+
+/// A column that no work requires and that was only guessed is left out where its unit does not do; answers with what was.
+fn drop_unusable(roles: &mut Roles, channels: &[Channel]) -> Vec<String> {
+    const OPTIONAL: [&str; 2] = ["brake_torque_nm", "brake_pressure_pa"];
+    let mut told = Vec::new();
+    roles.assigned.retain(|one| {
+        let optional = OPTIONAL.contains(&one.column.as_str());
+        let usable = channels
+            .get(one.channel)
+            .map(|channel| to_si(channel, &one.column, &one.entry));
+        match usable {
+            Some(Err(problem)) if optional => {
+                told.push(format!("left out: {}", problem.in_words()));
+                false
+            }
+            _ => true,
+        }
+    });
+    // Several that it may be are no less worth a word.
+    let several = roles
+        .refused
+        .iter()
+        .filter(|(role, reason)| OPTIONAL.contains(role) && reason.contains(" may be "));
+    told.extend(several.map(|(_, reason)| format!("left out: {reason}")));
+    told
 }
 
 impl Converted {

@@ -8,10 +8,12 @@ use std::time::{Duration, Instant};
 use common::{HEADER, RIG, Scratch, recording_of};
 use test_support::scenario::article;
 
-const SUBCOMMANDS: [&str; 9] = [
+const SUBCOMMANDS: [&str; 11] = [
     "rig",
     "estimate",
     "campaign",
+    "channels",
+    "convert",
     "fit",
     "diagnose",
     "predict",
@@ -101,7 +103,8 @@ fn bad_usage_is_one_line_and_status_2() {
     for (arguments, part) in [
         (&[][..], "a subcommand is needed"),
         (&["fly"], "unrecognized subcommand 'fly'"),
-        (&["estimate"], "--rig <RIG.toml>"),
+        (&["estimate"], "<RUN.csv>"),
+        (&["estimate", "run.csv"], "add --radius METRES"),
         (&["estimate", "--rig", "rig.toml"], "<RUN.csv>"),
         (
             &["estimate", "--rigg", "rig.toml", "run.csv"],
