@@ -170,7 +170,8 @@ pub(crate) fn mended4(file: FileBytes) -> Result<Mended, Problem> {
             faults.push(format!("byte {records}: records are cut off"));
             replaced.push((records + 8, there.to_le_bytes().to_vec()));
         }
-        if !is_list(&file, records) || !(has_ids || !is_list_whole(&file, records)) {
+        let joins = has_ids || !is_list_whole(&file, records);
+        if !joins || !is_list(&file, records) {
             continue;
         }
         let stream = joined(&file, records, &mut faults)?;

@@ -276,10 +276,10 @@ pub fn campaign(
     campaign_mapped(rig_path, recordings, None, progress)
 }
 
-/// As [`campaign`], of files whose channels the map at a path names, or else the rig file.
+/// As [`campaign()`], of files whose channels the map at a path names, or else the rig file.
 ///
 /// # Errors
-/// As [`campaign`]; the map comes after the rig file.
+/// As [`campaign()`]; the map comes after the rig file.
 pub fn campaign_mapped(
     rig_path: &Path,
     recordings: &[PathBuf],
