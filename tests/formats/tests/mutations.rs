@@ -2,6 +2,8 @@
 //!
 //! 10,000 damaged files a format; `MUSLIP_MUTATIONS=10000000` for more.
 
+#![allow(clippy::unwrap_used, clippy::panic, reason = "of tests alone")]
+
 use std::fs;
 use std::io::{Seek, Write};
 use std::path::{Path, PathBuf};
