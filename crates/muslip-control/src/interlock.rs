@@ -34,11 +34,12 @@ use crate::SAMPLE_S;
 use crate::board::{BridgeQuality, RawSample};
 use crate::conversion::Converted;
 use crate::encoder::Speed;
-use crate::sequence::ROLLING_SLIP;
 use crate::stop::EmergencyStop;
 
 /// Vehicle speed in m/s above which a locked wheel is a fault.
 pub const LOCK_SPEED_M_S: f32 = 5.0;
+/// Slip within which a wheel rolls freely.
+pub const ROLLING_SLIP: f32 = 0.05;
 /// How long a wheel may be locked in s. A locked aircraft tyre blows after about a third of a second.
 pub const LOCK_TIME_S: f32 = 0.2;
 /// Share of the vehicle speed below which the wheel's surface counts as locked.

@@ -22,11 +22,8 @@
 use muslip_record::{Fault, Profile, Program, State};
 
 use crate::SAMPLE_S;
-use crate::interlock::LOCK_SPEED_M_S;
+use crate::interlock::{LOCK_SPEED_M_S, ROLLING_SLIP};
 use crate::number::{nearest, whole_u16};
-
-/// Slip within which a wheel rolls freely.
-pub const ROLLING_SLIP: f32 = 0.05;
 
 const ARMED_SAMPLES: u32 = 60_000;
 const SPIN_UP_SAMPLES: u32 = 120_000;

@@ -9,7 +9,8 @@ use crate::format::Format;
 use crate::map::{Entry, Map};
 use crate::raster::{self, Done};
 use crate::roles::{self, Assigned, Roles, TIME};
-use crate::source::{Channel, Series, SourceFile};
+use crate::source::{Channel, Series};
+use crate::source_file::SourceFile;
 use crate::units::{self, Quantity};
 
 /// Most rows that a raster of `rate_hz` may have.

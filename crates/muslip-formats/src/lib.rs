@@ -45,8 +45,11 @@ mod parquet;
 pub mod raster;
 pub mod roles;
 mod source;
+mod source_file;
 #[cfg(feature = "tdms")]
 mod tdms;
+#[cfg(feature = "tdms")]
+mod tdms_property;
 #[cfg(feature = "tdms")]
 mod tdms_scaling;
 mod time_text;
@@ -56,7 +59,8 @@ pub use error::{FormatError, Place, Problem};
 pub use export::write_parquet;
 pub use format::Format;
 pub use guard::quiet_panics;
-pub use source::{Channel, Kind, Series, Source, SourceFile};
+pub use source::{Channel, Kind, Series, Source};
+pub use source_file::SourceFile;
 
 /// Most bytes that one block, column or variable may unpack to: 1 GiB.
 pub const MOST_BYTES: u64 = 1 << 30;

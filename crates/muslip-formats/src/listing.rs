@@ -2,7 +2,8 @@
 
 use crate::raster;
 use crate::roles::Roles;
-use crate::source::{Channel, Series, SourceFile};
+use crate::source::{Channel, Series};
+use crate::source_file::SourceFile;
 
 /// Channels that are read at once.
 const AT_ONCE: usize = 8;

@@ -9,6 +9,7 @@ use std::sync::Arc;
 use crate::error::Problem;
 use crate::file_bytes::{Cursor, FileBytes, Number};
 use crate::source::{Channel, Kind, Series, Source};
+use crate::tdms_property::Property;
 use crate::tdms_scaling::Scaling;
 use crate::time_text::rfc3339;
 
@@ -26,15 +27,6 @@ const RAW_DATA: u32 = 1 << 3;
 const INTERLEAVED: u32 = 1 << 5;
 const BIG_ENDIAN: u32 = 1 << 6;
 const DAQMX: u32 = 1 << 7;
-
-/// The value of a property.
-#[derive(Debug, Clone, PartialEq)]
-pub(crate) enum Property {
-    Number(f64),
-    Text(String),
-    /// Nanoseconds since 1970.
-    Time(i64),
-}
 
 /// Type of a channel's raw values.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -6,7 +6,7 @@
 use std::collections::BTreeMap;
 
 use crate::error::Problem;
-use crate::tdms::Property;
+use crate::tdms_property::Property;
 
 /// The input that is the raw value.
 const RAW: u32 = 0xffff_ffff;
