@@ -109,21 +109,23 @@ fn shared(rig: &Rig, runs: &[Recording]) -> Option<Memory> {
             })
             .collect()
     };
+    // Means over samples that follow each other, the samples themselves taken in an instant.
+    let grid = (step, step - sample);
     let range = (1, COMMON_LAG_S);
     // A held speed owes the drag nothing: the wheel's own motion may be taken out, noise of its causes and all.
     if !rig.coasting && speeds.iter().all(|s| s.unmoved.len() == s.wheel.len()) {
-        let quiet = structure(&pairs(|s| &s.unmoved), step, range).memory(false);
-        let seen = structure(&pairs(|s| &s.wheel), step, range).memory(false);
+        let quiet = structure(&pairs(|s| &s.unmoved), grid, range).memory(false);
+        let seen = structure(&pairs(|s| &s.wheel), grid, range).memory(false);
         return [quiet, seen]
             .into_iter()
             .flatten()
             .min_by(|a, b| a.std.total_cmp(&b.std))
             .filter(Memory::is_sure);
     }
-    let both = structure(&pairs(|s| &s.wheel), step, range);
+    let both = structure(&pairs(|s| &s.wheel), grid, range);
     let memory = both.memory(false).filter(Memory::is_sure)?;
     // A speed that truly wavers takes the wheel along by a force.
-    let forced = structure(&pairs(|s| &s.impulse), step, range);
+    let forced = structure(&pairs(|s| &s.impulse), grid, range);
     let at = 2.0 * memory.time;
     (rig.coasting || forced.at(at) < 0.5 * both.at(at)).then_some(memory)
 }

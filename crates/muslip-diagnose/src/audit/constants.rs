@@ -66,6 +66,16 @@ pub const LEAK_LEVEL: f64 = 0.98;
 pub const LEAK_COPIES: f64 = 0.25;
 /// Lowest frequency at which a line is looked for, Hz: brakes are worked at lower ones.
 pub const HUM_LOWEST_HZ: f64 = 12.0;
+/// Length of the windows that hum is looked for in, s.
+pub const HUM_WINDOW_S: f64 = 2.5;
+/// Orders of the wheel's turning that hum could be mistaken for.
+pub const HUM_ORDERS: core::ops::RangeInclusive<usize> = 1..=12;
+/// Spread of hum's amplitude over windows, as a share of it, at most.
+pub const HUM_SPREAD: f64 = 0.5;
+/// Relative distance from a line up to which an order of the wheel's turning may be it.
+pub const HUM_NEAR: f64 = 0.3;
+/// Share of a line's power that the wheel's angle may explain as well as the clock.
+pub const HUM_SHARE: f64 = 0.7;
 /// A line's power against the median of its neighbours'.
 pub const LINE_RATIO: f64 = 15.0;
 /// An order's power against that beside it.
@@ -78,10 +88,11 @@ pub const SMOOTH_S: f64 = 0.12;
 pub const CALM: f64 = 0.015;
 /// A filter is told from so many standard deviations of its second moment.
 pub const FILTER_SIGMAS: f64 = 5.0;
+/// Whitened squares by which a filter of the drag explains it better than a delay and than a tyre's length: on
+/// development campaigns with such a filter hundreds to thousands.
+pub const POLE_SQUARES: f64 = 50.0;
 /// Shortest time constant that is told, s.
 pub const LEAST_FILTER_S: f64 = 0.008;
-/// Share of the vehicle residual's variance that lasts longer than a few samples, from which its noise is coloured.
-pub const COLOURED_SHARE: f64 = 0.75;
 /// Longest time constant of a channel's noise, s: what lasts longer is physics or drift.
 pub const LONGEST_COLOUR_S: f64 = 0.7;
 /// Share of its free-rolling speed from which a wheel counts as rolling.

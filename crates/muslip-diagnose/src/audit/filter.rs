@@ -1,7 +1,7 @@
 //! Filters: a channel that is not only later than the others but slower.
 
-use super::constants::{FILTER_SIGMAS, LEAST_FILTER_S};
-use super::finding::{Finding, Timing, Word};
+use super::constants::{FILTER_SIGMAS, LEAST_FILTER_S, POLE_SQUARES, TOLD_SIGMAS};
+use super::finding::{Finding, Word};
 use super::recording::Recording;
 use super::timing::Timings;
 
@@ -31,31 +31,13 @@ fn of_vehicle(timings: &Timings) -> Option<Finding> {
     ))
 }
 
-/// A filter of the drag: everything else is early by the same, and the vehicle speed, where it shows, the quicker by
-/// what a filter of that delay makes.
+/// A filter of the drag: behind a pole the law explains it much better than late by a delay, or following over a way.
 fn of_drag(timings: &Timings) -> Option<Finding> {
-    let early: Vec<Timing> = [timings.wheel, timings.vehicle, timings.brake]
-        .into_iter()
-        .filter(|t| t.std.is_finite())
-        .collect();
-    let sure = |t: &&Timing| -t.value > LEAST_FILTER_S.max(3.0 * t.std);
-    if early.len() < 2 || early.iter().filter(sure).count() < early.len() {
-        return None;
-    }
-    let all = early.iter().copied().fold(Timing::UNKNOWN, Timing::with);
-    let apart = early
-        .iter()
-        .any(|t| (t.value - all.value).abs() > 2.0 * t.std + 0.1 * all.value.abs());
-    let quicker = timings
-        .vehicle_moment
-        .is_none_or(|(moment, std)| moment < -FILTER_SIGMAS * std);
-    (!apart && quicker).then(|| {
-        passed(
-            "drag_force_n",
-            -all.value,
-            all.std.max(0.05 * all.value.abs()),
-        )
-    })
+    let pole = timings.drag_pole.as_ref()?;
+    let (time, std) = pole.time;
+    let told = time > LEAST_FILTER_S.max(TOLD_SIGMAS * std)
+        && pole.better.iter().all(|squares| *squares > POLE_SQUARES);
+    told.then(|| passed("drag_force_n", time, std.max(0.05 * time)))
 }
 
 /// Filters of the vehicle speed and of the drag.
@@ -72,6 +54,8 @@ pub fn filters(timings: &Timings, runs: &[Recording]) -> Vec<Finding> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::finding::Timing;
+    use super::super::law::Pole;
     use super::*;
 
     #[test]
@@ -85,12 +69,17 @@ mod tests {
         assert!((filters(&timings, &[])[0].value - 0.05).abs() < 1e-9);
         timings.vehicle_moment = Some((1e-4, 1e-4));
         assert!(filters(&timings, &[]).is_empty());
-        timings = Timings {
-            wheel: late(-0.02),
-            brake: late(-0.0205),
+        let pole = |better: [f64; 2]| Timings {
+            drag_pole: Some(Pole {
+                time: (0.02, 1e-3),
+                better,
+            }),
             ..Timings::default()
         };
-        let found = filters(&timings, &[]);
-        assert!(found[0].channel == "drag_force_n" && (found[0].value - 0.02).abs() < 1e-3);
+        let found = filters(&pole([900.0, 400.0]), &[]);
+        assert!(found[0].channel == "drag_force_n" && (found[0].value - 0.02).abs() < 1e-9);
+        // A delay, or a tyre, explains it as well.
+        assert!(filters(&pole([1.0, 400.0]), &[]).is_empty());
+        assert!(filters(&pole([900.0, -30.0]), &[]).is_empty());
     }
 }

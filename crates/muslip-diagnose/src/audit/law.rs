@@ -1,7 +1,8 @@
 //! The tyre's law as a clock: the drag follows the slip, so the delay of the speeds shows wherever slip moves.
 
 use super::constants::{
-    FEWEST_BLOCKS, HELD_WIDTH_S, MOMENT_S2, MOST_ROWS, SPEED_WIDTH_S, WHEEL_RANGE_S, WHEEL_STEP_S,
+    FEWEST_BLOCKS, HELD_WIDTH_S, LEAST_FILTER_S, MOMENT_S2, MOST_ROWS, SPEED_WIDTH_S, TOLD_SIGMAS,
+    WHEEL_RANGE_S, WHEEL_STEP_S,
 };
 use super::finding::Timing;
 use super::recording::{Block, Recording, blocks, spans};
@@ -22,6 +23,23 @@ pub const WHEEL: usize = 3;
 pub const VEHICLE: usize = 4;
 /// Second moment by which the speeds are slower than the drag, s².
 pub const MOMENT: usize = 5;
+/// How long the drag's memory is, s or, of a tyre that follows over a length, m.
+pub const LAG: usize = 6;
+/// Number of the unknowns.
+const UNKNOWNS: usize = 7;
+
+/// What keeps the drag back behind the law's force.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Lag {
+    /// Nothing but what its delay against the wheel's speed does.
+    None,
+    /// A pole: a filter.
+    Pole,
+    /// The way rolled: a tyre.
+    Length,
+    /// A mean over a time around: no memory, but it takes the noise of slip away as memories do.
+    Mean,
+}
 
 struct Law<'a> {
     runs: &'a [Recording],
@@ -32,6 +50,7 @@ struct Law<'a> {
     vehicle: Timing,
     /// Vehicle speed of each run, smoothed and, where its delay is known, in step with the drag.
     speeds: Vec<Signal>,
+    lag: Lag,
     /// Whether everything is averaged over the instruments' width, drag too: coarse, but proof against noisy inputs.
     smooth: bool,
 }
@@ -44,6 +63,8 @@ const INSTRUMENT_S: f64 = 0.06;
 const VEHICLE_PRIOR_S: f64 = 0.04;
 /// Step of the grid of the coarse scan, s.
 const COARSE_S: f64 = 0.015;
+/// Speed at which the search for a tyre's length begins, m/s.
+const SPEED_M_S: f64 = 15.0;
 /// Farthest that the refinement may take the wheel speed's delay from the coarse scan's, s.
 const ASTRAY_S: f64 = 0.025;
 
@@ -83,6 +104,12 @@ impl Law<'_> {
                 load[k] * x[PEAK] * 2.0 * u / (1.0 + u * u)
             })
             .collect();
+        let law = match self.lag {
+            Lag::None => law,
+            Lag::Pole => following(&law, self.step, |_| x[LAG]),
+            Lag::Length => following(&law, self.step, |k| x[LAG] / speed[k].max(1e-3)),
+            Lag::Mean => around(&law, self.step, x[LAG]),
+        };
         let law = low_pass(&law, self.step, faster);
         let own = if self.smooth { INSTRUMENT_S } else { self.step };
         let drag = low_pass(
@@ -136,7 +163,7 @@ impl Balance for Law<'_> {
     }
 
     fn steps(&self) -> Vec<f64> {
-        vec![1e-3, 1e-3, 1e-4, 5e-4, 1e-3, 2.5e-5]
+        vec![1e-3, 1e-3, 1e-4, 5e-4, 1e-3, 2.5e-5, 5e-4]
     }
 
     fn prior(&self) -> Vec<(f64, f64)> {
@@ -152,6 +179,7 @@ impl Balance for Law<'_> {
             (0.0, 0.1),
             vehicle,
             (0.0, MOMENT_S2),
+            (0.0, f64::INFINITY),
         ]
     }
 }
@@ -190,9 +218,47 @@ fn speed(rig: &Rig, run: &Recording, vehicle: Timing, moment: f64) -> Signal {
     Signal::new(&times, &rebuilt)
 }
 
+/// A force that follows with a time constant in s at each step; the trapezoidal rule, which keeps a pole where it is.
+fn following(force: &[f64], step: f64, time: impl Fn(usize) -> f64) -> Vec<f64> {
+    let mut state = force.first().copied().unwrap_or(0.0);
+    let mut before = state;
+    (0..force.len())
+        .map(|k| {
+            let twice = 2.0 * time(k).max(0.0);
+            state += ((force[k] + before) - 2.0 * state) * step / (twice + step);
+            before = force[k];
+            state
+        })
+        .collect()
+}
+
+/// Means over a time around each step, at least one step.
+fn around(force: &[f64], step: f64, time: f64) -> Vec<f64> {
+    let times: Vec<f64> = (0..force.len()).map(|k| k as f64 * step).collect();
+    Signal::new(&times, force).averages(0.0, step, force.len(), time.max(step))
+}
+
+/// What the law says of the drag's memory.
+#[derive(Clone, Debug)]
+pub struct Pole {
+    /// Time constant of the filter, s, and its standard deviation.
+    pub time: (f64, f64),
+    /// By how many whitened squares the filter explains the drag better than a delay, and than a tyre's length.
+    pub better: [f64; 2],
+}
+
+/// What the law says.
+#[derive(Clone, Debug)]
+pub struct Told {
+    /// The unknowns, the drag only delayed.
+    pub estimate: Solution,
+    /// A filter of the drag, where it is later than the wheel's speed.
+    pub pole: Option<Pole>,
+}
+
 /// What the law says, given what is known of the vehicle speed: its delay, and by what second moment it is slower, s².
 #[must_use]
-pub fn law(rig: &Rig, runs: &[Recording], vehicle: Timing, moment: f64) -> Option<Solution> {
+pub fn law(rig: &Rig, runs: &[Recording], vehicle: Timing, moment: f64) -> Option<Told> {
     if !(rig.radius_m > 0.0 && rig.peak_friction > 0.0 && rig.critical_slip > 0.0) {
         return None;
     }
@@ -214,6 +280,7 @@ pub fn law(rig: &Rig, runs: &[Recording], vehicle: Timing, moment: f64) -> Optio
         step,
         scale: sum / f64::max(count, 1.0),
         vehicle,
+        lag: Lag::None,
         smooth: true,
         speeds: runs
             .iter()
@@ -231,10 +298,50 @@ pub fn law(rig: &Rig, runs: &[Recording], vehicle: Timing, moment: f64) -> Optio
     balance.blocks = even(step);
     let begun = start[WHEEL];
     let known = vehicle.std.is_finite();
-    let fixed = [false, false, false, false, known, true];
+    let fixed = [false, false, false, false, known, true, true];
     let at = refine(&balance, &start, &[0.6], 3, &fixed)?;
-    let at = recoloured(&balance, at, &fixed)?;
-    ((at.unknowns[WHEEL] - begun).abs() < ASTRAY_S).then_some(at)
+    let estimate = recoloured(&balance, at, &fixed)?;
+    if (estimate.unknowns[WHEEL] - begun).abs() > ASTRAY_S {
+        return None;
+    }
+    let pole = pole(&mut balance, &estimate, &fixed);
+    Some(Told { estimate, pole })
+}
+
+/// The drag's memory as a filter, where it is later than the wheel's speed by what a filter worth a sentence would do: each
+/// form refitted with the wheel's own delay free beside it.
+fn pole(balance: &mut Law, delayed: &Solution, fixed: &[bool; UNKNOWNS]) -> Option<Pole> {
+    let late = -delayed.unknowns[WHEEL];
+    if !(late > LEAST_FILTER_S.max(TOLD_SIGMAS * delayed.std[WHEEL])) {
+        return None;
+    }
+    let mut fitted = |lag: Lag, size: f64, late: f64| {
+        balance.lag = lag;
+        let mut fixed = *fixed;
+        fixed[LAG] = lag == Lag::Mean;
+        let mut start = delayed.unknowns.clone();
+        // Where a memory keeps the drag back, both speeds are early by as much.
+        start[LAG] = size;
+        start[WHEEL] += late;
+        start[VEHICLE] += late;
+        let at = refine(balance, &start, &[0.6], 4, &fixed)?;
+        recoloured(balance, at, &fixed)
+    };
+    let pole = fitted(Lag::Pole, late, late)?;
+    let length = fitted(Lag::Length, late * SPEED_M_S, late);
+    // A pole takes noise of the slip away, and would win by that alone: a delay has a mean that takes as much.
+    let mean = fitted(Lag::Mean, 2.0 * pole.unknowns[LAG], 0.0)?;
+    let better = |other: &Solution| squares(other) - squares(&pole);
+    Some(Pole {
+        time: (pole.unknowns[LAG], pole.std[LAG]),
+        better: [better(&mean), length.as_ref().map_or(f64::INFINITY, better)],
+    })
+}
+
+/// Minus twice the log likelihood of innovations of unknown size.
+fn squares(found: &Solution) -> f64 {
+    let rows = found.rows as f64;
+    rows * (found.sum / rows).max(1e-300).ln()
 }
 
 /// The best of a scan over the wheel speed's delay, the law refitted at each.
@@ -246,7 +353,7 @@ fn coarse(balance: &Law) -> Option<Vec<f64>> {
         .filter_map(|k| {
             let mut x: Vec<f64> = prior.iter().map(|p| p.0).collect();
             x[WHEEL] = WHEEL_RANGE_S.0 + k as f64 * step;
-            let fixed = [false, false, true, false, true, true];
+            let fixed = [false, false, true, false, true, true, true];
             refine(balance, &x, &[0.6], 3, &fixed)
         })
         .min_by(|a, b| a.sum.total_cmp(&b.sum))

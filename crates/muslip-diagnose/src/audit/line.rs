@@ -1,36 +1,25 @@
-//! Narrow lines: mains hum in the drag, and ripple of the wheel speed over the wheel's angle.
+//! Ripple of the wheel speed: lines over the wheel's angle.
 
-use super::constants::{
-    CALM, HUM_LOWEST_HZ, LINE_RATIO, ORDERS, RIPPLE_RATIO, ROLLING_SHARE, SMOOTH_S,
-};
+use super::constants::{CALM, ORDERS, RIPPLE_RATIO, ROLLING_SHARE, SMOOTH_S};
 use super::finding::{Finding, Word};
 use super::recording::Recording;
 use super::signal::Signal;
 use super::tyre::Stretch;
 use crate::smooth::median_in_place;
 
-/// Amplitude of a line in a series at given phases (rad): twice the mean of its product with the rotating pointer.
-fn pointer(series: &[f64], phase: impl Fn(usize) -> f64) -> (f64, f64) {
+/// Power of a line at given phases in rad: a quarter of the squared amplitude.
+pub(super) fn power(series: &[f64], phases: impl Iterator<Item = f64>) -> f64 {
     let (mut cos, mut sin) = (0.0, 0.0);
-    for (k, x) in series.iter().enumerate() {
-        let (s, c) = phase(k).sin_cos();
+    for (x, phase) in series.iter().zip(phases) {
+        let (s, c) = phase.sin_cos();
         cos += x * c;
         sin += x * s;
     }
-    let share = 2.0 / series.len().max(1) as f64;
-    (cos * share, sin * share)
-}
-
-/// Readings less their own smooth course, and how much of a line of a frequency that leaves.
-fn rough(time: &[f64], clean: &[f64], from: usize, to: usize) -> Vec<f64> {
-    let signal = Signal::new(&time[from..to], &clean[from..to]);
-    (from..to)
-        .map(|k| clean[k] - signal.averages(time[k], 1.0, 1, SMOOTH_S)[0])
-        .collect()
+    (cos * cos + sin * sin) / (series.len().max(1) as f64).powi(2)
 }
 
 /// Share of a sine of a frequency that the smooth course takes away.
-fn taken(hz: f64) -> f64 {
+pub(super) fn taken(hz: f64) -> f64 {
     let angle = core::f64::consts::PI * hz * SMOOTH_S;
     if angle < 1e-6 {
         1.0
@@ -39,172 +28,12 @@ fn taken(hz: f64) -> f64 {
     }
 }
 
-struct Piece {
-    time: Vec<f64>,
-    rough: Vec<f64>,
-    spectrum: Vec<f64>,
-}
-
-/// Pieces of all runs with their power at even frequencies `spacing` apart.
-fn pieces(runs: &[Recording], spacing: f64, count: usize) -> Vec<Piece> {
-    let mut planner = realfft::RealFftPlanner::<f64>::new();
-    runs.iter()
-        .filter(|run| run.drag.clean.len() > 200)
-        .filter_map(|run| {
-            let clean = &run.drag.clean;
-            let n = clean.len();
-            if clean.iter().any(|x| !x.is_finite()) {
-                return None;
-            }
-            let rough = rough(&run.time, clean, 0, n);
-            let rate = 1.0 / run.step;
-            let length = ((rate / spacing).round() as usize)
-                .max(n)
-                .next_power_of_two()
-                .min(1 << 17);
-            let span = run.time[n - 1] - run.time[0];
-            let even = ((span * rate) as usize).min(length);
-            let signal = Signal::new(&run.time, &rough);
-            let mut input = signal.means(run.time[0], run.step.max(1e-4), even);
-            if run.step < 0.002 || (n as f64 - even as f64).abs() < 2.0 + 0.001 * n as f64 {
-                // An even sampler: its own readings, nothing averaged.
-                input = rough[..even.min(n)].to_vec();
-            }
-            let whole = input.len() as f64;
-            for (k, x) in input.iter_mut().enumerate() {
-                *x *= 0.5 - 0.5 * (core::f64::consts::TAU * (k as f64 + 0.5) / whole).cos();
-            }
-            input.resize(length, 0.0);
-            let plan = planner.plan_fft_forward(length);
-            let mut out = plan.make_output_vec();
-            plan.process(&mut input, &mut out).ok()?;
-            let bins = rate / length as f64;
-            let spectrum = (0..count)
-                .map(|i| {
-                    let bin = i as f64 * spacing / bins;
-                    let low = (bin - 0.5 * spacing / bins).floor().max(0.0) as usize;
-                    let high = (bin + 0.5 * spacing / bins).ceil() as usize;
-                    out.get(low..=high.min(out.len() - 1).max(low))
-                        .map_or(0.0, |x| x.iter().map(|c| c.norm_sqr()).fold(0.0, f64::max))
-                        / whole
-                })
-                .collect();
-            Some(Piece {
-                time: run.time.clone(),
-                rough,
-                spectrum,
-            })
-        })
+/// Readings less their own smooth course, and how much of a line of a frequency that leaves.
+pub(super) fn rough(time: &[f64], clean: &[f64], from: usize, to: usize) -> Vec<f64> {
+    let signal = Signal::new(&time[from..to], &clean[from..to]);
+    (from..to)
+        .map(|k| clean[k] - signal.averages(time[k], 1.0, 1, SMOOTH_S)[0])
         .collect()
-}
-
-/// Mains hum in the drag: amplitude in N and frequency, where there is a line.
-#[must_use]
-pub fn hum(runs: &[Recording]) -> Option<Finding> {
-    let mut rates: Vec<f64> = runs.iter().map(|run| 1.0 / run.step).collect();
-    let mut spans: Vec<f64> = runs
-        .iter()
-        .filter_map(|run| Some(run.time.last()? - run.time.first()?))
-        .collect();
-    if spans.is_empty() {
-        return None;
-    }
-    let rate = median_in_place(&mut rates);
-    let spacing = 1.0 / median_in_place(&mut spans).clamp(1.0, 40.0);
-    let count = (0.48 * rate.min(500.0) / spacing) as usize;
-    let pieces = pieces(runs, spacing, count);
-    if pieces.is_empty() {
-        return None;
-    }
-    let mean: Vec<f64> = (0..count)
-        .map(|i| pieces.iter().map(|p| p.spectrum[i]).sum::<f64>() / pieces.len() as f64)
-        .collect();
-    let first = (HUM_LOWEST_HZ / spacing).ceil() as usize;
-    let reach = 40;
-    let best = (first..count.saturating_sub(3)).max_by(|a, b| mean[*a].total_cmp(&mean[*b]))?;
-    let mut around: Vec<f64> = (best.saturating_sub(reach)..(best + reach).min(count))
-        .filter(|i| i.abs_diff(best) > 3)
-        .map(|i| mean[i])
-        .collect();
-    let floor = median_in_place(&mut around);
-    let flank = [best.saturating_sub(3), (best + 3).min(count - 1)]
-        .map(|i| mean[i])
-        .into_iter()
-        .fold(0.0, f64::max);
-    // In most runs, and narrow: a resonance is as high three lines away.
-    let everywhere = pieces
-        .iter()
-        .filter(|p| {
-            let mut own: Vec<f64> = (best.saturating_sub(reach)..(best + reach).min(count))
-                .map(|i| p.spectrum[i])
-                .collect();
-            p.spectrum[best] > 4.0 * median_in_place(&mut own)
-        })
-        .count();
-    if !(mean[best] > LINE_RATIO * floor
-        && mean[best] > 6.0 * flank
-        && 4 * everywhere >= 3 * pieces.len())
-    {
-        return None;
-    }
-    let (hz, amplitudes) = sharpen(&pieces, best as f64 * spacing, spacing);
-    // A wheel that turns at one speed makes lines as well.
-    if turns(runs, hz, spacing) {
-        return None;
-    }
-    let count = amplitudes.len() as f64;
-    let value = (amplitudes.iter().map(|a| a * a).sum::<f64>() / count).sqrt();
-    let spread = amplitudes.iter().map(|a| (a - value).powi(2)).sum::<f64>() / count;
-    Some(
-        Finding::of(
-            "drag_force_n",
-            Word::Hum,
-            (value, (spread / count).sqrt().max(0.02 * value)),
-            "N",
-        )
-        .saying(format!(
-            "The drag channel hums at {hz:.2} Hz with an amplitude of {value:.3} N."
-        )),
-    )
-}
-
-/// The frequency at which the line is strongest, and its amplitude in each piece.
-fn sharpen(pieces: &[Piece], near: f64, spacing: f64) -> (f64, Vec<f64>) {
-    let at = |hz: f64| -> Vec<f64> {
-        pieces
-            .iter()
-            .map(|p| {
-                let (c, s) = pointer(&p.rough, |k| core::f64::consts::TAU * hz * p.time[k]);
-                f64::hypot(c, s) / (1.0 - taken(hz)).max(0.2)
-            })
-            .collect()
-    };
-    let power = |hz: f64| at(hz).iter().map(|a| a * a).sum::<f64>();
-    let hz = (-10..=10)
-        .map(|i| near + 0.1 * f64::from(i) * spacing)
-        .max_by(|a, b| power(*a).total_cmp(&power(*b)))
-        .unwrap_or(near);
-    (hz, at(hz))
-}
-
-/// Whether a frequency is one of the wheel's turning, or a few times that, in most runs.
-fn turns(runs: &[Recording], hz: f64, spacing: f64) -> bool {
-    let hits = runs
-        .iter()
-        .filter(|run| {
-            let mut speeds: Vec<f64> = run
-                .moving
-                .iter()
-                .flat_map(|m| run.wheel.clean[m.clone()].iter().copied())
-                .collect();
-            if speeds.is_empty() {
-                return false;
-            }
-            let turn = median_in_place(&mut speeds) / core::f64::consts::TAU;
-            (1..=12).any(|order| (hz - f64::from(order) * turn).abs() < 2.0 * spacing + 0.01 * hz)
-        })
-        .count();
-    2 * hits > runs.len()
 }
 
 /// Ripple of the wheel speed that is locked to the wheel's angle: relative amplitude of its strongest order.
@@ -220,8 +49,8 @@ pub fn ripple(runs: &[Recording]) -> Option<Finding> {
             parts
                 .iter()
                 .map(|(series, angle, hz)| {
-                    let (c, s) = pointer(series, |k| order * angle[k]);
-                    f64::hypot(c, s) / (1.0 - taken(hz * order)).max(0.2)
+                    let power = power(series, angle.iter().map(|a| order * a));
+                    2.0 * power.sqrt() / (1.0 - taken(hz * order)).max(0.2)
                 })
                 .collect()
         };

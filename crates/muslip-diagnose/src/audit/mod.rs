@@ -4,7 +4,7 @@
 //! | --- | --- |
 //! | when each channel tells what happened | [`timing`]: [`vehicle`], [`wheel`], [`law`], all by [`squares`] |
 //! | what is held, what moves in steps | [`hold`], [`steps`], [`simple`] |
-//! | narrow lines: hum, ripple | [`mod@line`] |
+//! | narrow lines: hum, ripple | [`mod@hum`], [`mod@line`] |
 //! | what filters a channel passes | [`filter`] |
 //! | what is off at a standstill | [`still`] |
 //! | noise with a memory | [`colour`], by [`structure`] |
@@ -20,6 +20,7 @@ pub mod constants;
 pub mod filter;
 pub mod finding;
 pub mod hold;
+pub mod hum;
 pub mod law;
 pub mod leak;
 pub mod line;
@@ -38,7 +39,6 @@ pub mod wheel;
 pub use finding::{Finding, Timing, Word};
 
 use crate::campaign::{Rig, Run};
-use crate::smooth::{difference_sigma, median_in_place};
 use colour::Colour;
 use recording::{Recording, recording};
 use timing::{Timings, timings};
@@ -69,19 +69,6 @@ impl Audit {
     }
 }
 
-/// Slow noise of the vehicle speed, where its balance shows it.
-fn slow_noise(timings: &Timings, recordings: &[Recording]) -> Option<(Finding, Colour)> {
-    if recordings.iter().any(|run| run.speed.hold.is_some()) {
-        return None;
-    }
-    let left = timings.vehicle_left.as_ref()?;
-    let mut white: Vec<f64> = recordings
-        .iter()
-        .map(|run| difference_sigma(&run.speed.clean))
-        .collect();
-    colour::of_vehicle(&left.residual, left.step, median_in_place(&mut white))
-}
-
 /// What the speeds err by, together or the vehicle's alone, and that one's colour.
 fn of_speeds(
     rig: &Rig,
@@ -91,14 +78,13 @@ fn of_speeds(
     if let Some(finding) = common::common(rig, recordings) {
         return (Some(finding), None);
     }
-    let found = if rig.coasting {
-        slow_noise(timings, recordings)
-    } else if recordings.iter().any(|run| run.speed.hold.is_some()) {
-        None
-    } else {
-        colour::of_held(recordings)
-    };
-    found.unzip()
+    if recordings.iter().any(|run| run.speed.hold.is_some()) {
+        return (None, None);
+    }
+    match colour::of_speed(rig, recordings, timings) {
+        Some((finding, colour)) => (finding, Some(colour)),
+        None => (None, None),
+    }
 }
 
 /// Step of the grid for the drag's slow noise, s.
@@ -161,7 +147,7 @@ pub fn audit(rig: &Rig, runs: &[Run]) -> Audit {
         .map_or("", |(name, _)| name);
     let mut findings = timing::findings(&timings, brake);
     findings.extend(simple::simple(runs, &recordings));
-    findings.extend(line::hum(&recordings));
+    findings.extend(hum::hum(&recordings));
     findings.extend(leak::leaks(runs));
     findings.extend(filter::filters(&timings, &recordings));
     let (of_speeds, vehicle_colour) = of_speeds(rig, &timings, &recordings);
@@ -262,6 +248,29 @@ mod tests {
             .filter(|f| f.finding == Word::Late)
             .count();
         assert_eq!(late, 2, "{:?}", found.findings);
+    }
+
+    #[test]
+    fn a_filter_of_the_drag_is_told_from_its_delay() {
+        let changed = |change: fn(&[f64]) -> Vec<f64>| {
+            let runs = [0.0, 1.0, 2.0].map(|phase| {
+                let run = run(phase, 0.0, 0.0);
+                let drag_force_n = change(&run.drag_force_n);
+                Run {
+                    drag_force_n,
+                    ..run
+                }
+            });
+            let found = audit(&rig(), &runs).findings;
+            let mut filters = found
+                .into_iter()
+                .filter(|f| f.finding == Word::LowPassed && f.channel == "drag_force_n");
+            filters.next()
+        };
+        let filtered = changed(|drag| signal::low_pass(drag, 1e-3, 0.03)).unwrap();
+        assert!((filtered.value - 0.03).abs() < 2e-3, "{filtered:?}");
+        let delayed = changed(|drag| [&[drag[0]; 30], &drag[..drag.len() - 30]].concat());
+        assert!(delayed.is_none(), "{delayed:?}");
     }
 
     #[test]

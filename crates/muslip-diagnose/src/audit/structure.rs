@@ -2,13 +2,15 @@
 //!
 //! Half the mean of the product of two series' second differences over a lag is three times the variance of what is
 //! white in both, and for a shared part of variance c² and time constant T it grows as c² (3 − 4 exp(−l/T) + exp(−2l/T)).
-//! Whatever runs straight has none.
+//! Whatever runs straight has none; a motion that bends shows by the fourth power of the lag. Means over a width l₀ have
+//! the covariance of means: 2 (x − 1 + exp(−x)) / x² of the variance at no lag, (2 sinh(x/2) / x)² of it beyond, x = l₀/T.
 
 use super::constants::{
     LONGEST_COLOUR_S, MEMORY_BLOCK_S, MEMORY_GROUPS, MEMORY_LAGS, MEMORY_MOTION_S, MEMORY_SIGMAS,
     MEMORY_TIMES,
 };
 use crate::smooth::median_in_place;
+use nalgebra::{Matrix3, Vector3};
 
 /// Two series on one even grid; products are multiplied by a weight of their own.
 #[derive(Clone, Debug, Default)]
@@ -32,6 +34,9 @@ pub struct Memory {
     pub std: f64,
     /// Its time constant in s.
     pub time: f64,
+    /// How fast it wanders, variance over time constant, and that figure's standard deviation: the two are known worse
+    /// than what the shortest lags show of both.
+    pub rate: (f64, f64),
     /// Variance of the shared part that is white.
     pub white: f64,
 }
@@ -47,7 +52,7 @@ impl Memory {
     /// Whether it is beyond chance.
     #[must_use]
     pub fn is_sure(&self) -> bool {
-        self.variance > MEMORY_SIGMAS * self.std && self.variance > 0.0
+        self.rate.0 > MEMORY_SIGMAS * self.rate.1 && self.variance > 0.0
     }
 }
 
@@ -56,7 +61,57 @@ impl Memory {
 pub struct Structure {
     lags: Vec<usize>,
     step: f64,
+    /// Width of the means that the series are made of, s.
+    width: f64,
     blocks: Vec<Sums>,
+}
+
+/// What a structure is made of beside motion.
+#[derive(Clone, Copy, Debug)]
+struct Parts {
+    white: f64,
+    lasting: f64,
+    time: f64,
+}
+
+impl Parts {
+    fn rate(&self) -> f64 {
+        self.lasting / self.time
+    }
+}
+
+/// Shares of three columns, none negative, that leave the least of what is fitted; and what they explain of it.
+fn non_negative(gram: &Matrix3<f64>, pull: &Vector3<f64>) -> (Vector3<f64>, f64) {
+    let mut best = (Vector3::zeros(), 0.0);
+    for chosen in 1..8_usize {
+        let with = |i: usize| chosen >> i & 1 == 1;
+        if (0..3).any(|i| with(i) && !(gram[(i, i)] > 0.0)) {
+            continue;
+        }
+        // Scaled to ones on the diagonal; a column that is left out stands by itself.
+        let scale = Vector3::from_fn(|i, _| {
+            if with(i) {
+                gram[(i, i)].sqrt().recip()
+            } else {
+                0.0
+            }
+        });
+        let scaled = Matrix3::from_fn(|i, j| {
+            let alone = if i == j && !with(i) { 1.0 } else { 0.0 };
+            scale[i] * gram[(i, j)] * scale[j] + alone
+        });
+        let Some(factor) = scaled.cholesky() else {
+            continue;
+        };
+        let shares = factor
+            .solve(&pull.component_mul(&scale))
+            .component_mul(&scale);
+        let gain = shares.dot(pull);
+        if shares.iter().all(|s| *s >= 0.0 && s.is_finite()) && gain > best.1 {
+            best = (shares, gain);
+        }
+    }
+    best
 }
 
 #[derive(Clone, Debug, Default)]
@@ -67,9 +122,13 @@ struct Sums {
     series: usize,
 }
 
-/// Sums over all series on grids of a step in s, from a lag of so many steps to one in s.
+/// Sums over all series on grids of a step, of means over a width (both in s), from a lag of so many steps to one in s.
 #[must_use]
-pub fn structure(pairs: &[Pair], step: f64, (shortest, longest_s): (usize, f64)) -> Structure {
+pub fn structure(
+    pairs: &[Pair],
+    (step, width): (f64, f64),
+    (shortest, longest_s): (usize, f64),
+) -> Structure {
     let longest = ((longest_s / step) as usize).max(shortest + 4);
     let mut lags: Vec<usize> = (0..MEMORY_LAGS)
         .map(|i| {
@@ -106,7 +165,12 @@ pub fn structure(pairs: &[Pair], step: f64, (shortest, longest_s): (usize, f64))
             blocks.push(sums);
         }
     }
-    Structure { lags, step, blocks }
+    Structure {
+        lags,
+        step,
+        width,
+        blocks,
+    }
 }
 
 impl Structure {
@@ -208,49 +272,46 @@ impl Structure {
             .collect()
     }
 
-    /// White and lasting variance with the time constant that fits best.
-    fn fit(means: &[(f64, f64, f64)], white: bool, step: f64) -> Option<(f64, f64, f64)> {
-        let mut best: Option<(f64, f64, f64, f64)> = None;
+    /// The parts that fit best.
+    fn fit(&self, means: &[(f64, f64, f64)], white: bool) -> Option<Parts> {
+        let mut best: Option<(Parts, f64)> = None;
         let longest = LONGEST_COLOUR_S.min(means.last()?.0);
-        let shortest = 0.8 * step.max(0.008);
+        let shortest = 0.8 * self.step.max(0.008);
         for i in 0..MEMORY_TIMES {
             let share = i as f64 / (MEMORY_TIMES - 1) as f64;
             let time = shortest * (longest / shortest).max(1.0).powf(share);
-            // Normal equations of two unknowns.
-            let (mut ww, mut wc, mut cc, mut wx, mut cx, mut xx) = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0);
+            let (mut gram, mut pull) = (Matrix3::zeros(), Vector3::zeros());
             for &(lag, x, size) in means {
                 let weight = (size * size * lag).max(1e-300).recip();
-                let decay = (-lag / time).exp();
-                let column = 3.0 - 4.0 * decay + decay * decay;
                 let flat = if white { 3.0 } else { 0.0 };
-                ww += weight * flat * flat;
-                wc += weight * flat * column;
-                cc += weight * column * column;
-                wx += weight * flat * x;
-                cx += weight * column * x;
-                xx += weight * x * x;
+                let column = Vector3::new(flat, self.growth(lag, time), (lag / longest).powi(4));
+                gram += weight * column * column.transpose();
+                pull += weight * x * column;
             }
-            let (flat, lasting) = if white {
-                let det = ww * cc - wc * wc;
-                if !(det > 1e-9 * ww * cc) {
-                    continue;
-                }
-                ((cc * wx - wc * cx) / det, (ww * cx - wc * wx) / det)
-            } else {
-                (0.0, cx / cc)
-            };
-            // Neither variance is negative.
-            let (flat, lasting) = if flat < 0.0 {
-                (0.0, cx / cc)
-            } else {
-                (flat, lasting)
-            };
-            let left = xx - flat * wx - lasting * cx;
-            if left.is_finite() && best.is_none_or(|b| left < b.3) {
-                best = Some((lasting, time, flat, left));
+            let (shares, gain) = non_negative(&gram, &pull);
+            if best.as_ref().is_none_or(|b| gain > b.1) {
+                let parts = Parts {
+                    white: shares[0],
+                    lasting: shares[1],
+                    time,
+                };
+                best = Some((parts, gain));
             }
         }
-        best.map(|b| (b.0, b.1, b.2))
+        best.map(|b| b.0)
+    }
+
+    /// What noise of variance one and a time constant has at a lag.
+    fn growth(&self, lag: f64, time: f64) -> f64 {
+        let x = self.width / time;
+        let (own, beyond) = if x > 1e-3 {
+            let half = (0.5 * x).sinh() / (0.5 * x);
+            (2.0 * (x - 1.0 + (-x).exp()) / (x * x), half * half)
+        } else {
+            (1.0, 1.0)
+        };
+        let decay = (-lag / time).exp();
+        3.0 * own - beyond * (4.0 * decay - decay * decay)
     }
 
     /// What lasts in it; `white` where the series may share white noise as well.
@@ -260,18 +321,23 @@ impl Structure {
             return None;
         }
         let weighed = self.weighed();
-        let (variance, time, flat) = Self::fit(&self.means(&weighed, None), white, self.step)?;
-        let others: Vec<f64> = (0..MEMORY_GROUPS)
-            .filter_map(|g| Some(Self::fit(&self.means(&weighed, Some(g)), white, self.step)?.0))
+        let all = self.fit(&self.means(&weighed, None), white)?;
+        let others: Vec<Parts> = (0..MEMORY_GROUPS)
+            .filter_map(|g| self.fit(&self.means(&weighed, Some(g)), white))
             .collect();
-        let count = others.len() as f64;
-        let mean = others.iter().sum::<f64>() / count;
-        let spread = others.iter().map(|x| (x - mean).powi(2)).sum::<f64>();
+        // One group left out in turn (jackknife).
+        let spread = |figure: fn(&Parts) -> f64| {
+            let count = others.len() as f64;
+            let mean = others.iter().map(figure).sum::<f64>() / count;
+            let squares = others.iter().map(|p| (figure(p) - mean).powi(2));
+            (squares.sum::<f64>() * (count - 1.0) / count).sqrt()
+        };
         Some(Memory {
-            variance,
-            std: (spread * (count - 1.0) / count).sqrt(),
-            time,
-            white: flat,
+            variance: all.lasting,
+            std: spread(|p| p.lasting),
+            time: all.time,
+            rate: (all.rate(), spread(Parts::rate)),
+            white: all.white,
         })
     }
 
@@ -328,7 +394,7 @@ mod tests {
 
     #[test]
     fn what_two_series_share_is_found_and_what_they_do_not_is_not() {
-        let found = structure(&[pair(0.7, 12_000)], 0.005, (1, 0.3))
+        let found = structure(&[pair(0.7, 12_000)], (0.005, 0.0), (1, 0.3))
             .memory(false)
             .unwrap();
         let (size, std) = found.size();
@@ -337,22 +403,62 @@ mod tests {
             "{found:?}"
         );
         assert!((found.time / 0.05).ln().abs() < 0.4, "{found:?}");
-        let none = structure(&[pair(0.0, 12_000)], 0.005, (1, 0.3));
+        let none = structure(&[pair(0.0, 12_000)], (0.005, 0.0), (1, 0.3));
         assert!(!none.memory(false).unwrap().is_sure());
-        assert!(structure(&[], 0.005, (1, 0.3)).memory(false).is_none());
+        assert!(
+            structure(&[], (0.005, 0.0), (1, 0.3))
+                .memory(false)
+                .is_none()
+        );
+    }
+
+    #[test]
+    fn a_motion_that_bends_is_no_memory_and_hides_none() {
+        let bent = |shared: f64| {
+            let mut one = pair(shared, 12_000);
+            for (k, x) in one.a.iter_mut().enumerate() {
+                *x += 100.0 * (k as f64 * 0.005 * 0.7).sin();
+            }
+            one.b = one.a.clone();
+            structure(&[one], (0.005, 0.0), (1, 0.5))
+                .memory(true)
+                .unwrap()
+        };
+        assert!(!bent(0.0).is_sure(), "{:?}", bent(0.0));
+        assert!(
+            (bent(2.0).variance.sqrt() - 2.0).abs() < 0.4,
+            "{:?}",
+            bent(2.0)
+        );
+    }
+
+    #[test]
+    fn means_over_a_width_show_the_noise_itself() {
+        // Means over twenty steps of a noise that forgets within ten.
+        let mut one = pair(2.0, 120_000);
+        let means = one.a.chunks_exact(20).map(|c| c.iter().sum::<f64>() / 20.0);
+        one.a = means.collect();
+        one.b = one.a.clone();
+        one.factor.truncate(one.a.len());
+        let found = structure(&[one], (0.1, 0.1), (1, 1.0))
+            .memory(false)
+            .unwrap();
+        assert!((found.variance.sqrt() - 2.0).abs() < 0.25, "{found:?}");
     }
 
     #[test]
     fn a_series_own_memory_is_told_from_its_white_noise() {
         let mut one = pair(2.0, 12_000);
         one.b = one.a.clone();
-        let found = structure(&[one], 0.005, (1, 0.5)).memory(true).unwrap();
+        let found = structure(&[one], (0.005, 0.0), (1, 0.5))
+            .memory(true)
+            .unwrap();
         assert!((found.variance.sqrt() - 2.0).abs() < 0.25, "{found:?}");
         assert!((found.white - 1.0).abs() < 0.25, "{found:?}");
         let mut white = pair(0.0, 12_000);
         white.b = white.a.clone();
         assert!(
-            !structure(&[white], 0.005, (1, 0.5))
+            !structure(&[white], (0.005, 0.0), (1, 0.5))
                 .memory(true)
                 .unwrap()
                 .is_sure()

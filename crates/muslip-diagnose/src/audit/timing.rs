@@ -8,7 +8,7 @@ use super::hold::Hold;
 use super::law;
 use super::recording::Recording;
 use super::squares::Solution;
-use super::vehicle::{Left, vehicle};
+use super::vehicle::vehicle;
 use super::wheel::wheel;
 use crate::campaign::Rig;
 use crate::smooth::median_in_place;
@@ -26,8 +26,8 @@ pub struct Timings {
     pub vehicle_moment: Option<(f64, f64)>,
     /// Second moment by which the wheel speed is slower than the drag, s², and its standard deviation.
     pub wheel_moment: Option<(f64, f64)>,
-    /// What the vehicle's balance leaves.
-    pub vehicle_left: Option<Left>,
+    /// What the law says of a filter of the drag.
+    pub drag_pole: Option<law::Pole>,
     /// What each balance said, for a closer look: vehicle, wheel, law.
     pub estimates: [Option<Solution>; 3],
 }
@@ -71,9 +71,8 @@ pub fn timings(rig: &Rig, runs: &[Recording]) -> Timings {
     let held_wheel = median_of(runs, |run| waiting(run, run.wheel.hold));
     let held_speed = median_of(runs, |run| waiting(run, run.speed.hold));
     if rig.coasting
-        && let Some((estimate, left)) = vehicle(runs, rig.mass_kg)
+        && let Some(estimate) = vehicle(runs, rig.mass_kg)
     {
-        out.vehicle_left = Some(left);
         out.vehicle = delay(&estimate, 1, held_speed, step);
         out.vehicle_moment = Some((estimate.unknowns[2], estimate.std[2]));
         out.estimates[0] = Some(estimate);
@@ -82,7 +81,9 @@ pub fn timings(rig: &Rig, runs: &[Recording]) -> Timings {
         value: out.vehicle.value - held_speed,
         ..out.vehicle
     };
-    if let Some(estimate) = law::law(rig, runs, known, out.vehicle_moment.map_or(0.0, |m| m.0)) {
+    let moment = out.vehicle_moment.map_or(0.0, |m| m.0);
+    if let Some(law::Told { estimate, pole }) = law::law(rig, runs, known, moment) {
+        out.drag_pole = pole;
         out.wheel = out
             .wheel
             .with(delay(&estimate, law::WHEEL, held_wheel, step));

@@ -5,7 +5,7 @@ use super::constants::{
 };
 use super::recording::{Block, Recording, blocks, spans};
 use super::signal::low_pass;
-use super::squares::{Balance, Solution, recoloured, refine, rest, scan_value};
+use super::squares::{Balance, Solution, recoloured, refine, scan_value};
 
 /// Unknowns: scale of the drag's impulse, delay in s, and signed square of the time constant by which v is slower, s².
 struct Vehicle<'a> {
@@ -122,18 +122,42 @@ pub(super) fn powers(count: usize, how_many: i32) -> Vec<Vec<f64>> {
         .collect()
 }
 
-/// What the balance leaves, in m/s, on an even grid.
-#[derive(Clone, Debug, Default)]
-pub struct Left {
-    /// Residuals of each stretch.
-    pub residual: Vec<Vec<f64>>,
-    /// Step of the grid in s.
-    pub step: f64,
+/// Speeds of all stretches in which the vehicle moves, as means over steps of an even grid.
+#[must_use]
+pub fn speeds(runs: &[Recording], step: f64) -> Vec<Vec<f64>> {
+    grids(runs, step)
+        .map(|(run, (start, step, count))| run.speed.signal.means(start, step, count))
+        .collect()
+}
+
+/// The same without the drag's impulse as the balance found it: what is left runs straight but for forces that are not the
+/// drag's, and noise.
+#[must_use]
+pub fn free(runs: &[Recording], mass: f64, found: &Solution, step: f64) -> Vec<Vec<f64>> {
+    let x = &found.unknowns;
+    let scale = x[0] / mass;
+    grids(runs, step)
+        .zip(speeds(runs, step))
+        .map(|((run, grid), speed)| {
+            let impulse = impulse_like(run, grid, x[1], x[2]);
+            let both = speed.iter().zip(&impulse);
+            both.map(|(v, i)| v + scale * i).collect()
+        })
+        .collect()
+}
+
+/// Even grids over the stretches in which the vehicle moves: the run, and start, step and number.
+fn grids(runs: &[Recording], step: f64) -> impl Iterator<Item = (&Recording, (f64, f64, usize))> {
+    let stretches = spans(runs).into_iter();
+    stretches.map(move |(run, from, to)| {
+        let count = ((to - from) / step) as usize;
+        (&runs[run], (from + 0.5 * step, step, count))
+    })
 }
 
 /// What the balance says: delay of v against the drag, and by what filter it is slower.
 #[must_use]
-pub fn vehicle(runs: &[Recording], mass: f64) -> Option<(Solution, Left)> {
+pub fn vehicle(runs: &[Recording], mass: f64) -> Option<Solution> {
     let stretches = spans(runs);
     let whole: f64 = stretches.iter().map(|(_, a, b)| b - a).sum();
     let step = VEHICLE_STEP_S.max(whole / MOST_ROWS as f64);
@@ -163,10 +187,5 @@ pub fn vehicle(runs: &[Recording], mass: f64) -> Option<(Solution, Left)> {
         .1;
     let start = [1.0, best, 0.0];
     let at = refine(&balance, &start, &[0.95], 4, &[false, false, true])?;
-    let at = recoloured(&balance, at, &[false; 3])?;
-    let left = Left {
-        residual: rest(&balance, &at.unknowns),
-        step,
-    };
-    Some((at, left))
+    recoloured(&balance, at, &[false; 3])
 }
