@@ -244,6 +244,40 @@ fn an_error_leaves_everything_as_it_was() {
 }
 
 #[test]
+fn an_update_without_a_report_decides_refuses_and_ends_as_one_with_it() {
+    let mut noise = Noise::seeded(11);
+    let (mut accepted, mut rejected, mut refused) = (0, 0, 0);
+    for run in 0..60 {
+        let mut lean = Config::<f32>::default().build().unwrap();
+        let mut reporting = lean;
+        for step in 0..400 {
+            let slip = (noise.normal(1.0).abs() * 0.2).min(1.0);
+            let off = match (step * 7 + run) % 53 {
+                0 => 2.0,
+                1 => 1e15,
+                2 => 1e25,
+                _ => noise.normal(SIGMA),
+            };
+            let sigma = if step % 97 == 3 { 1e-25 } else { SIGMA };
+            let measurement = at(slip, law(0.8, 0.14, slip) + off, sigma);
+            let in_full = reporting.update_reporting(&measurement);
+            let outcome = lean.update(&measurement);
+            match &outcome {
+                Ok(Decision::Accepted) => accepted += 1,
+                Ok(Decision::Rejected) => rejected += 1,
+                Err(_) => refused += 1,
+            }
+            assert_eq!(outcome, in_full.map(|fusion| fusion.decision));
+            assert_eq!(lean, reporting);
+        }
+    }
+    assert!(
+        accepted > 20_000 && rejected > 300 && refused > 300,
+        "{accepted} {rejected} {refused}"
+    );
+}
+
+#[test]
 fn an_outlier_is_reported_as_rejected_and_changes_nothing_but_its_count() {
     let slips = article_slips();
     let mut filter = Config::<f32>::default().build().unwrap();

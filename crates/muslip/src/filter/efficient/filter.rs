@@ -81,16 +81,58 @@ impl<T: Real> EfficientFilter<T> {
     }
 }
 
+/// Less than the noise's variance over the declared one can be: the learnt one is held within 0.15.
+const LEAST_NOISE: f64 = 0.1;
+
+/// Variance of a measurement that can be taken.
+fn checked_variance<T: Real>(measurement: &FrictionMeasurement<T>) -> Result<T, UpdateError> {
+    for (value, input) in [
+        (measurement.slip_ratio, Input::SlipRatio),
+        (measurement.friction, Input::Friction),
+        (measurement.friction_std, Input::Noise),
+    ] {
+        if !value.is_finite() {
+            return Err(UpdateError::NonFinite(input));
+        }
+    }
+    if measurement.friction_std <= T::ZERO {
+        return Err(UpdateError::NonPositiveNoise);
+    }
+    Ok(measurement.friction_std * measurement.friction_std)
+}
+
 impl<T: Real> Estimator<T> for EfficientFilter<T> {
     type Measurement = FrictionMeasurement<T>;
     type Fusion = Fusion<T>;
     type Estimate = Estimate<T>;
     type Error = UpdateError;
 
-    /// Corrects the estimate with one measured friction, or rejects it at the gate. That a squared innovation
-    /// must be finite takes the report, which is then thrown away.
+    /// Corrects the estimate with one measured friction, or rejects it at the gate. The report is made only where a
+    /// squared innovation might not be finite over its variance.
     fn update(&mut self, measurement: &FrictionMeasurement<T>) -> Result<Decision, UpdateError> {
-        Ok(self.update_reporting(measurement)?.decision)
+        let variance = checked_variance(measurement)?;
+        let FrictionMeasurement {
+            slip_ratio,
+            friction,
+            ..
+        } = *measurement;
+        let State {
+            peak_friction,
+            critical_slip,
+        } = self.state();
+        let about_peak = slip_ratio * slip_ratio + critical_slip * critical_slip;
+        let innovation =
+            friction - peak_friction * (slip_ratio * (critical_slip + critical_slip) / about_peak);
+        if !(innovation * innovation / (T::from_f64(LEAST_NOISE) * variance)).is_finite() {
+            return Ok(self.update_reporting(measurement)?.decision);
+        }
+        let mut after = self.estimate;
+        let decision = after.fuse(&self.config, slip_ratio, friction, variance);
+        if !after.is_sound() {
+            return Err(UpdateError::Overflow);
+        }
+        self.estimate = after;
+        Ok(decision)
     }
 
     /// The innovation's variance is made with the noise as learnt. Gains are P Hᵀ/S with P before the
@@ -99,26 +141,14 @@ impl<T: Real> Estimator<T> for EfficientFilter<T> {
         &mut self,
         measurement: &FrictionMeasurement<T>,
     ) -> Result<Fusion<T>, UpdateError> {
+        let variance = checked_variance(measurement)?;
         let FrictionMeasurement {
             slip_ratio,
             friction,
-            friction_std,
+            ..
         } = *measurement;
-        for (value, input) in [
-            (slip_ratio, Input::SlipRatio),
-            (friction, Input::Friction),
-            (friction_std, Input::Noise),
-        ] {
-            if !value.is_finite() {
-                return Err(UpdateError::NonFinite(input));
-            }
-        }
-        if friction_std <= T::ZERO {
-            return Err(UpdateError::NonPositiveNoise);
-        }
         let before = self.covariance();
         let slip = self.state().critical_slip;
-        let variance = friction_std * friction_std;
         let Expected {
             friction: predicted_friction,
             by_peak_friction,
