@@ -167,6 +167,15 @@ impl<T: Real> Compensation<T> {
         declared_radius_m: T,
         limits: SampleLimits<T>,
     ) -> Result<Compensator<T, N>, CompensationError> {
+        self.fits::<N>(declared_radius_m)?;
+        Ok(Compensator::new(self, declared_radius_m, limits))
+    }
+
+    /// Whether [`Compensation::build`] would build it.
+    ///
+    /// # Errors
+    /// Those of [`Compensation::build`].
+    pub fn fits<const N: usize>(&self, declared_radius_m: T) -> Result<(), CompensationError> {
         self.check(declared_radius_m)
             .map_err(CompensationError::OutOfRange)?;
         let capacity = u32::try_from(N).unwrap_or(u32::MAX);
@@ -181,7 +190,7 @@ impl<T: Real> Compensation<T> {
                 return Err(CompensationError::DelayDoesNotFit { capacity });
             }
         }
-        Ok(Compensator::new(self, declared_radius_m, limits))
+        Ok(())
     }
 }
 
@@ -199,6 +208,25 @@ impl<T: Real, const N: usize> Compensator<T, N> {
     /// What is compensated.
     pub fn compensation(&self) -> &Compensation<T> {
         &self.compensation
+    }
+
+    /// Compensates something else from its first step on. In place: the delay line may be large, and a copy of it
+    /// needs as much stack.
+    ///
+    /// # Errors
+    /// Those of [`Compensation::build`]; the compensator is exactly as it was before the call.
+    pub fn replace(
+        &mut self,
+        compensation: &Compensation<T>,
+        declared_radius_m: T,
+        limits: SampleLimits<T>,
+    ) -> Result<(), CompensationError> {
+        compensation.fits::<N>(declared_radius_m)?;
+        self.compensation = *compensation;
+        self.declared_radius_m = declared_radius_m;
+        self.limits = limits;
+        self.reset();
+        Ok(())
     }
 
     /// Back to before the first step.
