@@ -329,6 +329,7 @@ impl Controller {
             sample_rate_hz: SAMPLE_RATE_HZ,
             core_clock_hz: self.identity.core_clock_hz,
             emulated: self.identity.emulated,
+            estimating: self.estimation.estimating(),
             end: self.identity.end,
         }
     }
@@ -346,6 +347,7 @@ impl Controller {
             stack_used_bytes: self.resources.stack_used_bytes,
             brake_energy_j: whole_u32(self.interlocks.brake_energy_j()),
             parameters: self.identity.parameters,
+            estimating: self.estimation.estimating(),
             reset_flags: self.identity.reset_flags,
             end: self.identity.end,
         }
@@ -469,8 +471,9 @@ impl Controller {
             return Err(Refusal::WrongState(self.sequence.state()));
         }
         validate::parameters(parameters).map_err(Refusal::Parameter)?;
-        self.estimation =
-            Estimation::new(parameters).map_err(|_| Refusal::Parameter(NOISE_FIELD))?;
+        self.estimation
+            .take(parameters)
+            .map_err(|_| Refusal::Parameter(NOISE_FIELD))?;
         self.parameters = *parameters;
         self.conversion = Conversion::new(parameters);
         self.interlocks.take(parameters);

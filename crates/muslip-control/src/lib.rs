@@ -5,7 +5,7 @@
 //! main loop   Controller::control    counts and codes to SI units                  conversion, encoder
 //!                                    interlocks, before anything else              interlock
 //!                                    state machine, brake demand                   sequence
-//!                                    slip, friction, filter                        estimation
+//!                                    slip, friction, compensation, estimator       estimation
 //!             Actuators::actuate     valve and dump valve                          board, brake
 //!             Controller::communicate  commands in, telemetry out                  controller, link
 //! ```
@@ -31,6 +31,7 @@ pub mod ads131m02;
 pub mod board;
 pub mod brake;
 pub mod ceiling;
+pub mod compensation;
 pub mod controller;
 pub mod conversion;
 pub mod emulation;

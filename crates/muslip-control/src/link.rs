@@ -27,6 +27,7 @@ pub enum Urgency {
 
 /// What has just arrived.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[expect(clippy::large_enum_variant, reason = "no heap to box it in")]
 pub enum Arrival {
     /// A command to do, and its number.
     Command(u16, Command),

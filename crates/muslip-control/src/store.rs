@@ -68,6 +68,7 @@ pub struct Loaded {
 }
 
 /// What a slot holds.
+#[expect(clippy::large_enum_variant, reason = "no heap to box it in")]
 enum Content {
     /// Nothing was ever written.
     Blank,

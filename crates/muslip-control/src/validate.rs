@@ -3,6 +3,7 @@
 use muslip_record::{Parameters, Profile, Program};
 
 use crate::ceiling;
+use crate::compensation;
 use crate::interlock::{LOCK_SPEED_M_S, wheel_change_rad_s2};
 
 /// The first field outside its range, in the order of the type's fields counted from 0.
@@ -51,9 +52,13 @@ pub fn parameters(p: &Parameters) -> Result<(), u8> {
     ];
     match (0..).zip(checks).find(|(_, good)| !good) {
         Some((number, _)) => Err(number),
-        None => Ok(()),
+        None => compensation::check(&p.compensation, p.wheel.effective_radius_m)
+            .map_err(|number| COMPENSATION_FIELD + number),
     }
 }
+
+/// Number of the first effect that can be compensated among the parameters.
+const COMPENSATION_FIELD: u8 = 30;
 
 /// Whether every field of a profile is within its range.
 pub fn profile(profile: &Profile) -> bool {

@@ -6,11 +6,15 @@
 /// side: two sources that mean the same may differ.
 pub const SCHEMA_HASH: u32 = {
     let hash = fold(0x811c_9dc5, include_bytes!("wire.rs"));
-    fold(hash, include_bytes!("parameters.rs"))
+    let hash = fold(hash, include_bytes!("parameters.rs"));
+    fold(hash, include_bytes!("compensation.rs"))
 };
 
 /// The same over the parameters alone: what a controller stores with them, so that another layout is not read as this.
-pub const PARAMETERS_HASH: u32 = fold(0x811c_9dc5, include_bytes!("parameters.rs"));
+pub const PARAMETERS_HASH: u32 = {
+    let hash = fold(0x811c_9dc5, include_bytes!("parameters.rs"));
+    fold(hash, include_bytes!("compensation.rs"))
+};
 
 #[expect(
     clippy::indexing_slicing,

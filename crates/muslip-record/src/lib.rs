@@ -43,12 +43,17 @@
     )
 )]
 
+mod compensation;
 mod fault;
 mod frame;
 mod hash;
 mod parameters;
 mod wire;
 
+pub use compensation::{
+    CompensationParameters, Estimating, Estimator, LoadCompensation, RadiusCompensation,
+    RelaxationCompensation, SpeedCompensation, ThermalCompensation,
+};
 pub use frame::{BODY_BYTES, EncodeError, FRAME_BYTES, FrameError, FrameReader, encode};
 pub use hash::{PARAMETERS_HASH, SCHEMA_HASH};
 pub use parameters::{

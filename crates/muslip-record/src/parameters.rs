@@ -2,6 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::compensation::CompensationParameters;
+
 /// Everything that a rig sets. Sent, checked, taken and stored as a whole.
 ///
 /// Ranges are checked by the controller before any of it is taken.
@@ -23,12 +25,15 @@ pub struct Parameters {
     pub brake: BrakeParameters,
     /// Limits of the interlocks.
     pub limits: LimitParameters,
-    /// The two-state filter.
+    /// The two-state estimator.
     pub estimator: EstimatorParameters,
     /// Slip control.
     pub slip_control: SlipControlParameters,
     /// Heat of the brake.
     pub brake_heat: HeatParameters,
+    /// What a diagnosis found, for the estimate; nothing in a file without it.
+    #[serde(default)]
+    pub compensation: CompensationParameters,
 }
 
 /// The braked wheel and what it slows.
@@ -87,7 +92,7 @@ pub struct LimitParameters {
     pub minimum_supply_v: f32,
 }
 
-/// Range of tyres that the two-state filter starts from.
+/// Range of tyres that the two-state estimator starts from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum TyreRange {
     /// Aircraft tyres on runways.
@@ -96,18 +101,18 @@ pub enum TyreRange {
     Automotive,
 }
 
-/// The two-state filter.
+/// The two-state estimator.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct EstimatorParameters {
     /// Where it starts.
     pub tyre_range: TyreRange,
     /// Standard deviation of one sample's friction, > 0.
     pub friction_std: f32,
-    /// Factor on it, > 0; 3 by default.
+    /// Factor on it where the article's filter runs, > 0; 3 by default. The efficient estimator learns the noise.
     pub noise_inflation: f32,
-    /// Smallest slip that is given to the filter, 0..1.
+    /// Smallest slip that is given to the estimator, 0..1.
     pub skid_slip_minimum: f32,
-    /// Largest slip that is given to the filter, above the smallest, at most 1.05.
+    /// Largest slip that is given to the estimator, above the smallest, at most 1.05.
     pub skid_slip_maximum: f32,
 }
 
@@ -187,6 +192,7 @@ impl Default for Parameters {
                 maximum_energy_j: 1_800_000.0,
                 cooling_time_s: 120.0,
             },
+            compensation: CompensationParameters::default(),
         }
     }
 }

@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::compensation::Estimating;
 use crate::parameters::Parameters;
 
 /// Levels that a stepped profile can hold.
@@ -134,6 +135,8 @@ pub struct Hello {
     pub core_clock_hz: u32,
     /// True in the emulator, where sensors and brake are simulated.
     pub emulated: bool,
+    /// What estimates.
+    pub estimating: Estimating,
     /// How the program came to its end before the last reset, if it did.
     pub end: Option<PostMortem>,
 }
@@ -323,9 +326,9 @@ pub struct Sample {
 pub struct Estimate {
     /// Sample of which it is.
     pub tick: u32,
-    /// Slip of that sample; NaN where it is no measurement.
+    /// Slip of that sample as the estimator takes it; NaN where it is no measurement.
     pub slip_ratio: f32,
-    /// Friction of that sample; NaN where it is no measurement.
+    /// Friction of that sample as the estimator takes it; NaN where it is no measurement.
     pub friction: f32,
     /// Peak friction.
     pub peak_friction: f32,
@@ -337,8 +340,10 @@ pub struct Estimate {
     pub p01: f32,
     /// Variance of the slip at the peak.
     pub p11: f32,
-    /// Samples that went into it.
+    /// Samples that went into it; those left out as outliers did not.
     pub updates: u32,
+    /// What estimates.
+    pub estimating: Estimating,
 }
 
 /// The quarter-car filter's estimate, with its covariance.
@@ -422,6 +427,8 @@ pub struct Status {
     pub brake_energy_j: u32,
     /// Where the parameters in use come from.
     pub parameters: Origin,
+    /// What estimates.
+    pub estimating: Estimating,
     /// What caused the last reset: bits 31 to 24 of the chip's RCC_CSR; 0 in the emulator.
     pub reset_flags: u8,
     /// How the program came to its end before the last reset, if it did.

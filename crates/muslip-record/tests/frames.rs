@@ -10,6 +10,11 @@ fn envelope<T>(body: T) -> Envelope<T> {
     }
 }
 
+const WORST_ESTIMATING: Estimating = Estimating {
+    estimator: Estimator::Article,
+    compensated: u8::MAX,
+};
+
 fn worst_sample() -> Telemetry {
     Telemetry::Sample(Sample {
         tick: u32::MAX,
@@ -33,6 +38,7 @@ fn worst_estimate() -> Telemetry {
         p01: 0.1,
         p11: 0.1,
         updates: u32::MAX,
+        estimating: WORST_ESTIMATING,
     })
 }
 
@@ -85,6 +91,7 @@ fn the_longest_messages_fit_a_frame() {
         stack_used_bytes: all,
         brake_energy_j: all,
         parameters: Origin::Previous,
+        estimating: WORST_ESTIMATING,
         reset_flags: u8::MAX,
         end: Some(PostMortem {
             end: End::Stack,
@@ -102,6 +109,32 @@ fn the_longest_messages_fit_a_frame() {
     parameters.normal.zero_code = i32::MIN;
     parameters.wheel_encoder.pulses_per_revolution = u16::MAX;
     parameters.vehicle_encoder.pulses_per_revolution = u16::MAX;
+    parameters.compensation = CompensationParameters {
+        effective_radius: Some(RadiusCompensation::WithSpeed {
+            relative_error: 0.1,
+            per_relative_speed_squared: 0.1,
+            mean_vehicle_speed_m_s: 20.0,
+        }),
+        force_delay_s: Some(0.01),
+        force_lag_s: Some(0.01),
+        load_crosstalk: Some(0.01),
+        load_sensitivity: Some(LoadCompensation {
+            sensitivity: 0.1,
+            critical_slip_exponent: 0.1,
+            mean_normal_force_n: 4000.0,
+        }),
+        speed_sensitivity: Some(SpeedCompensation::SlidingWithFloor {
+            floor: 0.8,
+            speed_scale_m_s: 5.0,
+        }),
+        relaxation: Some(RelaxationCompensation::Force { length_m: 0.3 }),
+        thermal_fade: Some(ThermalCompensation {
+            sensitivity_per_s: 0.1,
+            curvature_per_s2: 0.1,
+            time_constant_s: 5.0,
+            reference_power_w: 1e4,
+        }),
+    };
     let profile = Profile {
         program: Program::Steps {
             levels: [1.0; STEPS],

@@ -9,8 +9,12 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-use common::{RIG, Scratch, words};
+use common::{RIG, Scratch, number, words};
+use muslip_diagnose::campaign::Rig as DeclaredRig;
+use muslip_diagnose::mechanism::Context;
+use muslip_diagnose::repaired::{Repaired, RepairedParameter, RepairedTerm};
 use muslip_record::Parameters;
+use muslip_recordings::model_file::to_text;
 use pil::native::Native;
 use pil::rig::{Rig, Trouble};
 use pil::serve::Pace;
@@ -84,15 +88,135 @@ fn a_ramp_is_recorded_and_the_recording_goes_straight_into_the_estimate() {
     let text = scratch.read("run.csv");
     assert!(text.lines().count() > 800, "{}", text.lines().count());
     assert!(text.contains("brake_demand"));
-    let estimate = scratch.output(&[
-        "estimate",
-        "--rig",
-        "rig.toml",
-        "--range",
-        "automotive",
-        "run.csv",
-    ]);
-    assert!(estimate.contains("0.8"), "{estimate}");
+    assert!(
+        said.contains("estimator: efficient, nothing compensated"),
+        "{said}"
+    );
+    agrees(&said, &scratch, "estimate --rig rig.toml run.csv --json");
+}
+
+/// The live estimate and that of the recording are the same but for the noise, which each learns from its own samples.
+fn agrees(said: &str, scratch: &Scratch, estimate: &str) -> f64 {
+    let (_, line) = said.split_once("peak friction ").unwrap();
+    let live: Vec<f64> = line
+        .split_whitespace()
+        .filter_map(|word| word.parse().ok())
+        .take(4)
+        .collect();
+    let result = scratch.json(&words(estimate));
+    let of = |path| number(&result, path);
+    for (live, sigma, report) in [
+        (live[0], live[1], of("peak_friction.value")),
+        (live[2], live[3], of("critical_slip.value")),
+    ] {
+        // Printed to a thousandth.
+        let off = (live - report).abs();
+        assert!(off < 0.001 + sigma, "{said}{result:#}");
+    }
+    assert_eq!(result["estimator"], "efficient");
+    live[0]
+}
+
+#[test]
+fn a_diagnosed_model_is_compensated_live_as_in_the_report() {
+    // A drag channel that reads 5 % of the load.
+    let server = Server::start(Trouble {
+        drag_offset_n: 0.05 * 420.0 * 9.806_65,
+        ..Trouble::default()
+    });
+    let scratch = Scratch::with_rig(RIG);
+    let port = server.address.as_str();
+    let record = |name| {
+        scratch.output(&[
+            "rig", "--port", port, "run", "--ramp", "0.8", "--cool", "0.2", "--out", name,
+        ])
+    };
+    let biased = agrees(
+        &record("before.csv"),
+        &scratch,
+        "estimate --rig rig.toml before.csv --json",
+    );
+    assert!(biased > 0.88, "{biased}");
+    let term = |id: &str, form: &str, value| RepairedTerm {
+        id: id.into(),
+        form: form.into(),
+        equation: String::new(),
+        parameters: vec![RepairedParameter {
+            name: "p".into(),
+            value,
+            std: 0.0,
+            unit: "1".into(),
+        }],
+    };
+    let model = Repaired {
+        schema: "muslip.model/1".into(),
+        rig: DeclaredRig {
+            radius_m: 0.31,
+            wheel_inertia_kg_m2: 1.25,
+            mass_kg: 420.0,
+            torque_per_pressure_nm_pa: Some(0.00032),
+            peak_friction: 0.85,
+            critical_slip: 0.14,
+            ..DeclaredRig::default()
+        },
+        base_alone: vec![0.0, -2.0, 0.0, 0.0, 0.0],
+        base: vec![0.0, -2.0, 0.0, 0.0, 0.0],
+        context: Context {
+            radius: 0.31,
+            inertia: 1.25,
+            mass: 420.0,
+            nominal: [0.85, 0.14],
+            mean_load: 4_119.0,
+            mean_speed: 20.0,
+            max_speed: 20.0,
+            mean_wheel_speed: 64.5,
+            mean_power: 1e4,
+            dt: 1e-3,
+            duration: 6.0,
+            total_time: 6.0,
+            runs: 1,
+            ..Context::default()
+        },
+        tyre: vec![
+            term("load_crosstalk", "", 0.05),
+            term("zero_drift", "linear_in_run", 3.0),
+        ],
+        ..Repaired::default()
+    };
+    scratch.write("model.toml", to_text(&model, "by hand").unwrap());
+    let set = scratch
+        .muslip(&["rig", "--port", port, "parameters", "--model", "model.toml"])
+        .output()
+        .unwrap();
+    let said = String::from_utf8(set.stdout).unwrap();
+    // The simulated controller has no flash.
+    let told = String::from_utf8(set.stderr).unwrap();
+    assert!(
+        said.contains("compensated: load_crosstalk\n")
+            && said.contains("not compensated: zero_drift (linear_in_run): its time counts"),
+        "{said}{told}"
+    );
+    assert!(told.contains("could not be stored"), "{told}");
+    let status = scratch.output(&["rig", "--port", port, "status"]);
+    assert!(
+        status.contains("efficient, compensated: load_crosstalk"),
+        "{status}"
+    );
+    let printed = scratch.output(&["rig", "--port", port, "parameters"]);
+    assert!(
+        printed.contains("[compensation]\nload_crosstalk = 0.05"),
+        "{printed}"
+    );
+    let said = record("after.csv");
+    assert!(said.contains("compensated: load_crosstalk"), "{said}");
+    let estimate = "estimate --rig rig.toml --model crosstalk.toml after.csv --json";
+    let crosstalk = Repaired {
+        tyre: vec![term("load_crosstalk", "", 0.05)],
+        ..model
+    };
+    scratch.write("crosstalk.toml", to_text(&crosstalk, "by hand").unwrap());
+    let compensated = agrees(&said, &scratch, estimate);
+    assert!((compensated - 0.85).abs() < 0.02, "{compensated}");
 }
 
 #[test]

@@ -57,6 +57,11 @@ fn main() -> Result<()> {
         ("ramps", Box::new(|| scenarios::ramps(image))),
         ("full lock", Box::new(|| scenarios::full_lock(image))),
         ("steps", Box::new(|| scenarios::steps(image))),
+        ("compensation", Box::new(|| scenarios::compensation(image))),
+        (
+            "worst estimate",
+            Box::new(|| scenarios::worst_estimate(image)),
+        ),
         ("slip hold", Box::new(|| scenarios::slip_hold(image))),
         ("interlocks", Box::new(|| scenarios::interlocks(image))),
         ("byte by byte", Box::new(|| scenarios::byte_by_byte(image))),

@@ -21,6 +21,8 @@ const CYCLES_PER_SAMPLE: u32 = 168_000;
 /// The controller on a board of memory.
 pub struct Native {
     controller: Controller,
+    /// What has arrived and was not looked at yet, as the image's interrupt keeps it.
+    received: VecDeque<u8>,
     transmit: Queue,
 }
 
@@ -68,6 +70,7 @@ impl Native {
             .map_err(|error| anyhow!("default parameters: {error:?}"))?;
         Ok(Self {
             controller,
+            received: VecDeque::new(),
             transmit: Queue::default(),
         })
     }
@@ -76,9 +79,13 @@ impl Native {
 impl Target for Native {
     fn sample(&mut self, input: &Input<'_>) -> Result<Output> {
         let brake = self.controller.control(&input.raw);
-        let mut incoming = input.link.iter().copied();
-        self.controller
-            .communicate(|| incoming.next(), &mut self.transmit, &mut NoStore);
+        self.received.extend(input.link);
+        let Self {
+            controller,
+            received,
+            transmit,
+        } = self;
+        controller.communicate(|| received.pop_front(), transmit, &mut NoStore);
         // What the image finds out by counting.
         if input.burn > CYCLES_PER_SAMPLE {
             self.controller.overran();

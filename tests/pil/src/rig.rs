@@ -57,6 +57,10 @@ pub struct Trouble {
     pub stuck_brake_nm: Option<f64>,
     /// The drum is driven to this speed in m/s.
     pub driven_m_s: Option<f64>,
+    /// The wheel's encoder is driven at this speed in rad/s.
+    pub wheel_rad_s: Option<f64>,
+    /// The drag reads this in N.
+    pub drag_n: Option<f64>,
 }
 
 /// A rig at speed.
@@ -67,6 +71,8 @@ pub struct Rig {
     torque_nm: f64,
     wheel: Encoder,
     vehicle: Encoder,
+    /// Angle of the wheel's encoder in rad beyond the plant's.
+    wheel_rad: f64,
     /// Angle of the vehicle's encoder in rad where the drum is driven and the plant does not say.
     vehicle_rad: f64,
     random: ChaCha8Rng,
@@ -150,6 +156,7 @@ impl Rig {
             torque_nm: 0.0,
             wheel: Encoder::new(parameters.wheel_encoder.pulses_per_revolution),
             vehicle: Encoder::new(parameters.vehicle_encoder.pulses_per_revolution),
+            wheel_rad: 0.0,
             vehicle_rad: 0.0,
             random: ChaCha8Rng::seed_from_u64(seed),
             bridge: BridgeReading::default(),
@@ -189,8 +196,12 @@ impl Rig {
             self.plant.step(step_s, torque_nm, normal_force_n.max(1.0));
             let now_s = self.samples as f64 * SAMPLE_S + f64::from(step + 1) * step_s;
             let state = self.plant.state();
+            if let Some(driven_rad_s) = trouble.wheel_rad_s {
+                self.wheel_rad += (driven_rad_s - state.wheel_speed_rad_s) * step_s;
+            }
+            let angle_rad = state.wheel_angle_rad + self.wheel_rad;
             self.wheel
-                .turn(state.wheel_angle_rad, now_s, step_s, trouble.wheel_lost);
+                .turn(angle_rad, now_s, step_s, trouble.wheel_lost);
             let speed_m_s = trouble.driven_m_s.unwrap_or(state.vehicle_speed_m_s);
             self.vehicle_rad +=
                 speed_m_s * step_s / f64::from(self.parameters.vehicle_encoder_radius_m);
@@ -224,9 +235,11 @@ impl Rig {
             let draw: f64 = StandardNormal.sample(&mut self.random);
             sigma * draw
         };
+        let contact = self.plant.contact(normal_force_n.max(1.0));
         let drag_n = self
-            .plant
-            .drag_n(&self.plant.contact(normal_force_n.max(1.0)))
+            .trouble
+            .drag_n
+            .unwrap_or_else(|| self.plant.drag_n(&contact))
             + self.trouble.drag_offset_n
             + if self.trouble.drag_chatters && self.samples.is_multiple_of(2) {
                 10_000.0

@@ -12,6 +12,9 @@ use serde_json::json;
 
 use crate::measure::Survey;
 
+/// Why the zero's drift is left alone where no recording begins.
+const NO_BEGINNING: &str =
+    "its time counts from the beginning of a recording; tare the rig instead";
 /// Why a mechanism that is not of the vocabulary is left alone.
 const UNKNOWN: &str = "a mechanism that this program does not know";
 /// Shortest time without a sample, in s, that counts as a gap, ...
@@ -81,6 +84,17 @@ pub struct ModelUse {
 impl ModelUse {
     /// Sorts a model's mechanisms into what can be compensated and what cannot, for one recording.
     pub fn of(model: &Repaired, recording: &str, survey: &Survey) -> Self {
+        let run = RunInCampaign::find(model, recording, survey);
+        let step_s = survey.mean_step_s.min(model.context.dt);
+        Self::sorted(model, Some(&run), step_s)
+    }
+
+    /// The same for a rig that is sampled every `step_s` seconds, whatever was recorded before.
+    pub fn on_a_rig(model: &Repaired, step_s: f64) -> Self {
+        Self::sorted(model, None, step_s)
+    }
+
+    fn sorted(model: &Repaired, run: Option<&RunInCampaign>, step_s: f64) -> Self {
         let context = &model.context;
         let mut used = Self {
             compensation: Compensation {
@@ -91,9 +105,8 @@ impl ModelUse {
             holds_at: Vec::new(),
             noise: (model.noise.sigma_n, model.noise.share_of_force),
         };
-        let run = RunInCampaign::find(model, recording, survey);
         for term in &model.tyre {
-            let outcome = used.compensate(term, context, &run, survey);
+            let outcome = used.compensate(term, context, run, step_s);
             used.mechanisms.push(described(term, outcome.err()));
         }
         for term in &model.dynamics {
@@ -118,8 +131,8 @@ impl ModelUse {
         &mut self,
         term: &RepairedTerm,
         context: &Context,
-        run: &RunInCampaign,
-        survey: &Survey,
+        run: Option<&RunInCampaign>,
+        sampling_step_s: f64,
     ) -> Result<(), &'static str> {
         const UNKNOWN_FORM: &str = "a form that the filter has no compensation for";
         let value = |index: usize| {
@@ -156,7 +169,7 @@ impl ModelUse {
                 &mut on.force_delay,
                 ForceDelay {
                     delay_s: value(0)?,
-                    sampling_step_s: survey.mean_step_s.min(context.dt),
+                    sampling_step_s,
                 },
             ),
             Id::ForceLag => once(
@@ -166,6 +179,7 @@ impl ModelUse {
                 },
             ),
             Id::ZeroDrift => {
+                let run = run.ok_or(NO_BEGINNING)?;
                 let start_s = if form.ends_with("through_runs") {
                     run.time_before_s
                 } else {

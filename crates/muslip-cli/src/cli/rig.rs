@@ -5,14 +5,18 @@ use std::time::{Duration, Instant};
 
 use clap::{Args, Subcommand};
 use muslip_record::{
-    Command, Event, Fault, Origin, Parameters, Profile, Program, STEPS, State, Status, Telemetry,
+    Command, Estimating, Estimator, Event, Fault, Origin, Parameters, Profile, Program, STEPS,
+    State, Status, Telemetry,
 };
 use muslip_recordings::input_error::one_line;
+use muslip_recordings::model_file::ModelFile;
 
 use super::failure::Failure;
 use super::rig_view::{LiveView, Seen};
 use super::terminal::Terminal;
-use crate::rig_link::{Port, Recorder, RigError, Session, parse_parameters, write_parameters};
+use crate::rig_link::{
+    Live, Port, Recorder, RigError, Session, compensated, parse_parameters, write_parameters,
+};
 
 /// Operate a rig: arm it, run a brake profile and record it.
 ///
@@ -24,6 +28,7 @@ muslip rig --port /dev/ttyUSB0 status\n  \
 muslip rig --port /dev/ttyUSB0 tare\n  \
 muslip rig --port /dev/ttyUSB0 parameters > rig-parameters.toml\n  \
 muslip rig --port /dev/ttyUSB0 parameters --set rig-parameters.toml\n  \
+muslip rig --port /dev/ttyUSB0 parameters --model found/model.toml\n  \
 muslip rig --port /dev/ttyUSB0 run --ramp 0.5 --applications 3 --out run.csv\n  \
 muslip rig --port tcp:127.0.0.1:4500 run --slip 0.1 --hold 2 --out hold.csv")]
 pub(super) struct Arguments {
@@ -42,11 +47,15 @@ enum Action {
     Tare,
     /// Reset a latched fault whose cause has been removed.
     Clear,
-    /// Print the parameters, or set all of them from a file.
+    /// Print the parameters, or set all of them from a file, or what the estimate compensates from a model.
     Parameters {
         /// File to set them from (TOML, as printed).
         #[arg(long, value_name = "PARAMETERS.toml")]
         set: Option<PathBuf>,
+        /// Repaired model from muslip diagnose: the controller compensates what it can of it, in place of what it
+        /// compensated before.
+        #[arg(long, value_name = "MODEL.toml")]
+        model: Option<PathBuf>,
     },
     /// Arm, run a brake profile and record it.
     Run(Run),
@@ -95,7 +104,15 @@ impl From<RigError> for Failure {
 pub(super) fn run(arguments: &Arguments, terminal: &mut Terminal) -> Result<(), Failure> {
     // Files first: nothing is asked of a rig that a bad file will end.
     let parameters = match &arguments.action {
-        Action::Parameters { set: Some(path) } => Some(parse_parameters(path)?),
+        Action::Parameters {
+            set: Some(path), ..
+        } => Some(parse_parameters(path)?),
+        _ => None,
+    };
+    let model = match &arguments.action {
+        Action::Parameters {
+            model: Some(path), ..
+        } => Some(Live::new(&ModelFile::read(path)?.repaired)),
         _ => None,
     };
     let profile = match &arguments.action {
@@ -142,10 +159,8 @@ pub(super) fn run(arguments: &Arguments, terminal: &mut Terminal) -> Result<(), 
             terminal.line("fault cleared")
         }
         Action::Parameters { .. } => {
-            if let Some(parameters) = parameters {
-                let command = Command::SetParameters { parameters };
-                session.ask("accept the parameters", command, |_| {})?;
-                return terminal.line("parameters accepted and stored");
+            if parameters.is_some() || model.is_some() {
+                return set_parameters(parameters, model.as_ref(), &mut session, terminal);
             }
             let text = write_parameters(&read_parameters(&mut session)?)
                 .map_err(|error| Failure::Internal(error.to_string()))?;
@@ -156,6 +171,28 @@ pub(super) fn run(arguments: &Arguments, terminal: &mut Terminal) -> Result<(), 
             None => Ok(()),
         },
     }
+}
+
+/// Sets parameters from a file or those that the rig has, with what a model compensates in them.
+fn set_parameters(
+    parameters: Option<Parameters>,
+    model: Option<&Live>,
+    session: &mut Session,
+    terminal: &mut Terminal,
+) -> Result<(), Failure> {
+    let mut parameters = match parameters {
+        Some(parameters) => parameters,
+        None => read_parameters(session)?,
+    };
+    if let Some(model) = model {
+        parameters.compensation = model.parameters(parameters.wheel.effective_radius_m);
+        for line in model.in_words() {
+            terminal.line(&line)?;
+        }
+    }
+    let command = Command::SetParameters { parameters };
+    session.ask("accept the parameters", command, |_| {})?;
+    terminal.line("parameters accepted and stored")
 }
 
 fn profile(run: &Run) -> Result<Profile, Failure> {
@@ -238,6 +275,7 @@ fn print_status(status: &Status, terminal: &mut Terminal) -> Result<(), Failure>
             }
             .to_owned(),
         ),
+        ("estimator", estimating(&status.estimating)),
         ("frames received", link.received.to_string()),
         (
             "frames corrupt, oversized, foreign",
@@ -267,6 +305,20 @@ fn print_status(status: &Status, terminal: &mut Terminal) -> Result<(), Failure>
             format!("{} bytes", status.stack_used_bytes),
         ),
     ])
+}
+
+/// Which estimator runs, and on samples compensated for what.
+fn estimating(estimating: &Estimating) -> String {
+    let estimator = match estimating.estimator {
+        Estimator::Efficient => "efficient",
+        Estimator::Article => "article",
+    };
+    let names: Vec<&str> = compensated(estimating.compensated).collect();
+    if names.is_empty() {
+        format!("{estimator}, nothing compensated")
+    } else {
+        format!("{estimator}, compensated: {}", names.join(", "))
+    }
 }
 
 fn end(status: &Status) -> String {
@@ -357,6 +409,7 @@ fn record(
             estimate.p11.max(0.0).sqrt(),
             estimate.updates
         ))?;
+        terminal.line(&format!("estimator: {}", estimating(&estimate.estimating)))?;
     }
     let fault = match seen.fault {
         Some(fault) => Some(fault),

@@ -118,6 +118,7 @@ mod tests {
                 p01: 0.0,
                 p11: 2.5e-5,
                 updates: 3,
+                estimating: muslip_record::Estimating::default(),
             }),
             fault: Some(Fault::VehicleSensorOutOfRange),
         };

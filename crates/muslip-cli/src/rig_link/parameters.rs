@@ -2,11 +2,11 @@
 
 use std::path::Path;
 
-use muslip_record::Parameters;
+use muslip_record::{CompensationParameters, Parameters};
 use muslip_recordings::input_error::{InputError, InputProblem, one_line, system_reason};
 
 /// Names of the parameters in the order in which the controller counts them.
-const NAMES: [&str; 30] = [
+const NAMES: [&str; 38] = [
     "wheel.effective_radius_m",
     "wheel.inertia_kg_m2",
     "wheel.vehicle_mass_kg",
@@ -37,7 +37,26 @@ const NAMES: [&str; 30] = [
     "slip_control.maximum_torque_rate_nm_s",
     "brake_heat.maximum_energy_j",
     "brake_heat.cooling_time_s",
+    "compensation.effective_radius",
+    "compensation.force_delay_s",
+    "compensation.force_lag_s",
+    "compensation.load_crosstalk",
+    "compensation.load_sensitivity",
+    "compensation.speed_sensitivity",
+    "compensation.relaxation",
+    "compensation.thermal_fade",
 ];
+
+/// What can be compensated, in the order of its bits.
+pub fn compensated(bits: u8) -> impl Iterator<Item = &'static str> {
+    let names = NAMES
+        .iter()
+        .filter_map(|name| name.strip_prefix("compensation."));
+    names
+        .enumerate()
+        .filter(move |(at, _)| bits & 1 << at != 0)
+        .map(|(_, name)| name.trim_end_matches("_s"))
+}
 
 /// The name of the parameter that a controller refused by its number.
 pub fn field_name(index: u8) -> &'static str {
@@ -47,7 +66,7 @@ pub fn field_name(index: u8) -> &'static str {
         .unwrap_or("a parameter")
 }
 
-/// Reads parameters from a TOML file with every one of them.
+/// Reads parameters from a TOML file with every one of them; compensation only where there is some.
 ///
 /// # Errors
 /// [`InputError`]: the file is missing, is not TOML, or lacks a parameter.
@@ -81,6 +100,12 @@ struct TopLevelFirst {
     estimator: muslip_record::EstimatorParameters,
     slip_control: muslip_record::SlipControlParameters,
     brake_heat: muslip_record::HeatParameters,
+    #[serde(skip_serializing_if = "is_empty")]
+    compensation: CompensationParameters,
+}
+
+fn is_empty(compensation: &CompensationParameters) -> bool {
+    *compensation == CompensationParameters::default()
 }
 
 impl From<&Parameters> for TopLevelFirst {
@@ -97,6 +122,7 @@ impl From<&Parameters> for TopLevelFirst {
             estimator: p.estimator,
             slip_control: p.slip_control,
             brake_heat: p.brake_heat,
+            compensation: p.compensation,
         }
     }
 }
@@ -118,10 +144,57 @@ mod tests {
         assert!(told.contains("zero_code") && !told.contains('\n'), "{told}");
     }
 
+    /// Everything compensated.
+    fn full() -> Parameters {
+        use muslip_record::{
+            LoadCompensation, RadiusCompensation, RelaxationCompensation, SpeedCompensation,
+            ThermalCompensation,
+        };
+        Parameters {
+            compensation: CompensationParameters {
+                effective_radius: Some(RadiusCompensation::WithLoad {
+                    relative_error: 0.02,
+                    per_relative_load: 0.01,
+                    mean_normal_force_n: 4000.0,
+                }),
+                force_delay_s: Some(0.004),
+                force_lag_s: Some(0.01),
+                load_crosstalk: Some(0.03),
+                load_sensitivity: Some(LoadCompensation {
+                    sensitivity: 0.1,
+                    critical_slip_exponent: 0.2,
+                    mean_normal_force_n: 4000.0,
+                }),
+                speed_sensitivity: Some(SpeedCompensation::SlidingLinear { per_m_s: -0.01 }),
+                relaxation: Some(RelaxationCompensation::Slip { length_m: 0.3 }),
+                thermal_fade: Some(ThermalCompensation {
+                    sensitivity_per_s: 0.1,
+                    curvature_per_s2: 0.0,
+                    time_constant_s: 8.0,
+                    reference_power_w: 1e4,
+                }),
+            },
+            ..Parameters::default()
+        }
+    }
+
+    #[test]
+    fn what_is_compensated_survives_the_file_and_a_file_of_before_compensates_nothing() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("parameters.toml");
+        std::fs::write(&path, write_parameters(&full()).unwrap()).unwrap();
+        assert_eq!(parse_parameters(&path).unwrap(), full());
+        let before = write_parameters(&Parameters::default()).unwrap();
+        assert!(!before.contains("compensation"), "{before}");
+        assert_eq!(
+            compensated(0b1000_0011).collect::<Vec<_>>(),
+            ["effective_radius", "force_delay", "thermal_fade"]
+        );
+    }
+
     #[test]
     fn every_parameter_of_the_file_has_its_name_and_number() {
-        let value: toml::Value =
-            toml::from_str(&write_parameters(&Parameters::default()).unwrap()).unwrap();
+        let value: toml::Value = toml::from_str(&write_parameters(&full()).unwrap()).unwrap();
         let mut found = Vec::new();
         for (name, value) in value.as_table().unwrap() {
             match value.as_table() {

@@ -5,6 +5,7 @@
 )]
 
 mod chip;
+mod estimators;
 mod interlocks;
 mod link;
 mod runs;
@@ -14,6 +15,7 @@ use muslip_record::{Profile, Program};
 use crate::bench::{Bench, Worst};
 
 pub use chip::{endurance, fault_handlers, free_run, log};
+pub use estimators::{compensation, worst_estimate};
 pub use interlocks::interlocks;
 pub use link::{back_pressure, byte_by_byte, corruption, greets};
 pub use runs::{full_lock, ramps, slip_hold, steps};
