@@ -14,7 +14,6 @@ mod bridge;
 mod bus;
 mod clock;
 mod encoders;
-mod flash;
 mod gpio;
 mod outputs;
 
@@ -26,13 +25,13 @@ use stm32f4::stm32f405::{ADC1, GPIOB, GPIOC, IWDG, Peripherals};
 
 use crate::counter::cycles;
 use crate::dump::DUMP_LINE;
+use crate::flash::ParameterFlash;
 use crate::registers::{self, set_up};
 use crate::settings::{CORE_HZ, supply_mv, wait_for};
 use crate::valves::Valves;
 use bridge::Bridge;
 use bus::Bus;
 use encoders::Encoders;
-use flash::ParameterFlash;
 use outputs::{DumpPin, ValvePwm};
 
 pub use clock::runs_at_full_clock;
@@ -57,7 +56,7 @@ pub struct ChipSensors {
 /// The rig's valves, watchdog and flash.
 pub struct ChipActuators {
     valves: Valves<ValvePwm, DumpPin>,
-    store: Store<ParameterFlash>,
+    store: Store<ParameterFlash<Bus>>,
     watchdog: IWDG,
 }
 
@@ -94,7 +93,7 @@ pub fn start(_: &Peripherals) -> Up {
     gpio::start(&p.GPIOB, &p.GPIOC);
     start_supply(&p.ADC1);
     let valves = Valves::new(outputs::start_pwm(p.TIM1), DumpPin);
-    let mut store = Store::new(ParameterFlash::new(p.FLASH));
+    let mut store = Store::new(ParameterFlash::new(Bus));
     let loaded = store.load().ok().flatten();
     let sensors = ChipSensors {
         encoders: Encoders::start(p.TIM3, p.TIM4, p.TIM5, p.TIM2),

@@ -1,12 +1,12 @@
-//! Flash sectors 10 and 11, erased and programmed by words (3.6, 3.9).
-
-use core::ptr;
+//! Flash sectors 10 and 11, erased and programmed by words (RM0090, 3.6, 3.9).
+//!
+//! By addresses on a bus, registers and cells alike, so that a test can stand in for the chip and cut its power.
 
 use embedded_storage::nor_flash::{
     ErrorType, NorFlash, NorFlashError, NorFlashErrorKind, ReadNorFlash,
 };
-use stm32f4::stm32f405::FLASH;
 
+use crate::registers::Registers;
 use crate::settings::wait_for;
 
 /// Where the parameters are (memory.x).
@@ -14,9 +14,16 @@ const START: u32 = 0x080C_0000;
 const SECTOR_BYTES: u32 = 128 * 1024;
 const FIRST_SECTOR: u32 = 10;
 
+/// Registers (3.9).
+const ACR: u32 = 0x4002_3C00;
+const KEYR: u32 = ACR + 0x04;
+const SR: u32 = ACR + 0x0C;
+const CR: u32 = ACR + 0x10;
+
 /// Reads of a busy flag; the core stalls on each while the flash is busy, so that few are ever needed.
 const LIMIT: u32 = 100_000_000;
 
+const KEYS: [u32; 2] = [0x4567_0123, 0xCDEF_89AB];
 const BUSY: u32 = 1 << 16;
 /// Operation, protection, alignment, parallelism and sequence errors.
 const ERRORS: u32 = 1 << 1 | 1 << 4 | 1 << 5 | 1 << 6 | 1 << 7;
@@ -26,12 +33,14 @@ const START_ERASE: u32 = 1 << 16;
 const LOCK: u32 = 1 << 31;
 /// By 32 bits at once, at 2.7 V and above.
 const WORDS: u32 = 0b10 << 8;
+const DATA_CACHE: u32 = 1 << 10;
+const RESET_DATA_CACHE: u32 = 1 << 12;
 
 /// The two sectors.
-pub struct ParameterFlash(FLASH);
+pub struct ParameterFlash<B>(B);
 
 /// The flash refused or did not finish.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct FlashFailed;
 
 impl NorFlashError for FlashFailed {
@@ -40,54 +49,46 @@ impl NorFlashError for FlashFailed {
     }
 }
 
-impl ParameterFlash {
-    /// The two sectors, locked.
-    pub fn new(flash: FLASH) -> Self {
-        Self(flash)
-    }
-
-    fn control(&self, bits: u32) {
-        self.0.cr().write(|w| unsafe { w.bits(bits) });
+impl<B: Registers> ParameterFlash<B> {
+    /// The two sectors, locked. Whoever has the bus must be the only one who programs.
+    pub fn new(bus: B) -> Self {
+        Self(bus)
     }
 
     /// Does something unlocked and locks again.
     fn unlocked(
         &mut self,
-        work: impl FnOnce(&Self) -> Result<(), FlashFailed>,
+        work: impl FnOnce(&mut Self) -> Result<(), FlashFailed>,
     ) -> Result<(), FlashFailed> {
         // Errors of what was done before are none of this: cleared, they block nothing.
         self.finished()?;
-        self.0.sr().write(|w| unsafe { w.bits(ERRORS) });
-        for key in [0x4567_0123, 0xCDEF_89AB] {
-            self.0.keyr().write(|w| unsafe { w.bits(key) });
+        self.0.write(SR, ERRORS);
+        for key in KEYS {
+            self.0.write(KEYR, key);
         }
         let result = work(self);
-        self.control(LOCK);
+        self.0.write(CR, LOCK);
         // The data cache may hold what was there before (3.5.2): off, reset, on.
-        let acr = self.0.acr().read().bits();
-        for bits in [
-            acr & !(1 << 10),
-            acr & !(1 << 10) | 1 << 12,
-            acr & !(1 << 10),
-            acr,
-        ] {
-            self.0.acr().write(|w| unsafe { w.bits(bits) });
+        let acr = self.0.read(ACR);
+        let off = acr & !DATA_CACHE;
+        for bits in [off, off | RESET_DATA_CACHE, off, acr] {
+            self.0.write(ACR, bits);
         }
         result
     }
 
     /// Waits for the flash, and answers its status.
-    fn finished(&self) -> Result<u32, FlashFailed> {
+    fn finished(&mut self) -> Result<u32, FlashFailed> {
         let mut status = 0;
         let done = wait_for(LIMIT, || {
-            status = self.0.sr().read().bits();
+            status = self.0.read(SR);
             status & BUSY == 0
         });
         done.then_some(status).ok_or(FlashFailed)
     }
 
     /// Waits for the flash; an error flag is an error.
-    fn idle(&self) -> Result<(), FlashFailed> {
+    fn idle(&mut self) -> Result<(), FlashFailed> {
         if self.finished()? & ERRORS == 0 {
             Ok(())
         } else {
@@ -105,18 +106,25 @@ fn inside(offset: u32, length: usize) -> Result<(), FlashFailed> {
     }
 }
 
-impl ErrorType for ParameterFlash {
+impl<B> ErrorType for ParameterFlash<B> {
     type Error = FlashFailed;
 }
 
-impl ReadNorFlash for ParameterFlash {
-    const READ_SIZE: usize = 1;
+impl<B: Registers> ReadNorFlash for ParameterFlash<B> {
+    const READ_SIZE: usize = 4;
 
     fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), FlashFailed> {
         inside(offset, bytes.len())?;
-        for (byte, from) in bytes.iter_mut().zip(START + offset..) {
-            // SAFETY: within the two sectors, which are flash that no Rust object lives in.
-            *byte = unsafe { ptr::read_volatile(from as *const u8) };
+        if !offset.is_multiple_of(4) || !bytes.len().is_multiple_of(4) {
+            return Err(FlashFailed);
+        }
+        for (word, from) in bytes
+            .as_chunks_mut::<4>()
+            .0
+            .iter_mut()
+            .zip((START + offset..).step_by(4))
+        {
+            *word = self.0.read(from).to_le_bytes();
         }
         Ok(())
     }
@@ -126,19 +134,19 @@ impl ReadNorFlash for ParameterFlash {
     }
 }
 
-impl NorFlash for ParameterFlash {
+impl<B: Registers> NorFlash for ParameterFlash<B> {
     const WRITE_SIZE: usize = 4;
     const ERASE_SIZE: usize = SECTOR_BYTES as usize;
 
     fn erase(&mut self, from: u32, to: u32) -> Result<(), FlashFailed> {
         let sector = from / SECTOR_BYTES;
-        if from != sector * SECTOR_BYTES || to != from + SECTOR_BYTES || sector > 1 {
+        if sector > 1 || from != sector * SECTOR_BYTES || to != from + SECTOR_BYTES {
             return Err(FlashFailed);
         }
         self.unlocked(|flash| {
             let select = ERASE_SECTOR | (FIRST_SECTOR + sector) << 3 | WORDS;
-            flash.control(select);
-            flash.control(select | START_ERASE);
+            flash.0.write(CR, select);
+            flash.0.write(CR, select | START_ERASE);
             flash.idle()
         })
     }
@@ -149,14 +157,16 @@ impl NorFlash for ParameterFlash {
             return Err(FlashFailed);
         }
         self.unlocked(|flash| {
-            flash.control(PROGRAM | WORDS);
+            flash.0.write(CR, PROGRAM | WORDS);
             let words = bytes.as_chunks::<4>().0;
             for (word, to) in words.iter().zip((START + offset..).step_by(4)) {
-                // SAFETY: as in `read`; aligned, by the check above.
-                unsafe { ptr::write_volatile(to as *mut u32, u32::from_le_bytes(*word)) };
+                flash.0.write(to, u32::from_le_bytes(*word));
                 flash.idle()?;
             }
             Ok(())
         })
     }
 }
+
+#[cfg(test)]
+mod tests;
