@@ -7,6 +7,7 @@ mod estimators;
 mod figures;
 mod firmware;
 mod formats;
+mod fuzz;
 mod image;
 mod latency;
 mod mechanisms;
@@ -50,6 +51,15 @@ enum Command {
         /// Instead of all that: the image behind a socket at this address, for `muslip rig`.
         #[arg(long, value_name = "HOST:PORT")]
         serve: Option<String>,
+    },
+    /// The controller under sequences of commands, damage and faults, against a model of it.
+    Fuzz {
+        /// Samples with whatever arrives in them.
+        #[arg(long, default_value_t = 100_000_000)]
+        cases: u64,
+        /// Another seed makes other cases.
+        #[arg(long, default_value_t = 1)]
+        seed: u64,
     },
     /// What one update of each filter costs on a Cortex-M4F: instructions in QEMU, modelled cycles.
     Cycles {
@@ -130,6 +140,7 @@ fn main() -> anyhow::Result<()> {
                 None => firmware::pil(&arguments, write),
             }
         }
+        Command::Fuzz { cases, seed } => fuzz::run_all(cases, seed),
         Command::Cycles { check: true, .. } => cycles::check(),
         Command::Cycles { json, write, .. } => cycles::run_all(json, write),
         Command::Estimators {
