@@ -142,7 +142,7 @@ pub struct Started {
 )]
 pub fn start() -> Started {
     fault::guard_stack();
-    let end = fault::last_end();
+    let (end, brake_energy_j) = (fault::last_end(), fault::last_brake_energy_j());
     // SAFETY: called once, from `main`, before any interrupt is enabled.
     let peripherals = unsafe { Peripherals::steal() };
     // Set on silicon whenever the core runs from reset; never in QEMU, which does not model RCC.
@@ -162,6 +162,7 @@ pub fn start() -> Started {
             slow_clock: false,
             set_up: true,
             parameters: Origin::BuiltIn,
+            brake_energy_j,
         };
         (board, identity, Parameters::default())
     } else {
@@ -183,6 +184,7 @@ pub fn start() -> Started {
                 Some(_) => Origin::Previous,
                 None => Origin::BuiltIn,
             },
+            brake_energy_j,
         };
         let parameters = up
             .loaded

@@ -20,7 +20,7 @@ use muslip_record::{End, PostMortem, State};
 use crate::dump::dump;
 use crate::post_mortem::{WORDS, packed, state_of, unpacked};
 use crate::stack::GUARD_BYTES;
-use crate::{emulator, totals};
+use crate::{emulator, heat, totals};
 
 /// Bytes of the handlers' own stack.
 const HANDLER_STACK_BYTES: usize = 2048;
@@ -45,12 +45,36 @@ unsafe impl Sync for Record {}
 #[unsafe(link_section = ".uninit.post_mortem")]
 static RECORD: Record = Record(UnsafeCell::new(MaybeUninit::uninit()));
 
+struct Heat(UnsafeCell<MaybeUninit<[u32; heat::WORDS]>>);
+
+#[allow(unsafe_code, reason = "memory that a reset leaves alone")]
+// SAFETY: written by the thread alone, read at start-up.
+unsafe impl Sync for Heat {}
+
+#[allow(unsafe_code, reason = "memory that a reset leaves alone")]
+// SAFETY: what is in it is checked when it is read.
+#[unsafe(link_section = ".uninit.heat")]
+static HEAT: Heat = Heat(UnsafeCell::new(MaybeUninit::uninit()));
+
 /// State of the run after the last sample, by its number.
 static STATE: AtomicU32 = AtomicU32::new(0);
 
-/// Remembers the state of the run, for a record.
-pub fn remember(state: State) {
+/// Remembers the state of the run, for a record, and the energy in the brake in J, for after any reset.
+#[allow(unsafe_code, reason = "memory that a reset leaves alone")]
+pub fn remember(state: State, brake_energy_j: u32) {
     STATE.store(state as u32, Ordering::Relaxed);
+    let place = HEAT.0.get().cast::<u32>();
+    for (at, word) in heat::packed(brake_energy_j).into_iter().enumerate() {
+        // SAFETY: within the words; one after the other, so that a reset in between spoils one copy at most.
+        unsafe { ptr::write_volatile(place.add(at), word) };
+    }
+}
+
+/// Energy in the brake in J before the reset; 0 where memory has not kept it.
+#[allow(unsafe_code, reason = "memory that a reset leaves alone")]
+pub fn last_brake_energy_j() -> u32 {
+    // SAFETY: words, whatever they hold; nobody else is running yet.
+    heat::unpacked(&unsafe { ptr::read_volatile(HEAT.0.get().cast::<[u32; heat::WORDS]>()) })
 }
 
 /// The record of the last end, which is forgotten.

@@ -1,6 +1,6 @@
 //! The rig controller's board: what lies between `muslip-control` and the registers of an STM32F405.
 //!
-//! On a host this is a small library of what can be tested there: [`flash`], [`valves`], [`log_ring`], [`post_mortem`], [`registers`], [`settings`]. For the
+//! On a host this is a small library of what can be tested there: [`flash`], [`heat`], [`valves`], [`log_ring`], [`post_mortem`], [`registers`], [`settings`]. For the
 //! chip it adds the two boards, the interrupts and the main loop. One image serves both boards; which it runs
 //! on is decided at start-up by one bit (see docs/design/0005-controller.md).
 #![no_std]
@@ -22,6 +22,7 @@
 
 mod bits;
 pub mod flash;
+pub mod heat;
 pub mod log_ring;
 pub mod post_mortem;
 pub mod registers;

@@ -211,7 +211,7 @@ impl Loop {
         self.resources.worst_step_cycles = self.resources.worst_step_cycles.max(step);
         uart::kick();
         let state = self.controller.state();
-        fault::remember(state);
+        fault::remember(state, self.controller.brake_energy_j());
         if state != self.state {
             defmt::info!(
                 "{} -> {}, fault {}",

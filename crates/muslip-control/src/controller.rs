@@ -40,6 +40,8 @@ pub struct Identity {
     pub set_up: bool,
     /// Where the parameters come from.
     pub parameters: Origin,
+    /// Energy in the brake in J before the reset, where memory has kept it; 0 after power-up.
+    pub brake_energy_j: u32,
 }
 
 /// What the work has taken so far.
@@ -104,7 +106,7 @@ impl Controller {
             identity,
             parameters: *parameters,
             conversion: Conversion::new(parameters),
-            interlocks: Interlocks::new(parameters),
+            interlocks: Interlocks::new(parameters).heated(identity.brake_energy_j),
             sequence,
             estimation,
             slip_hold: None,
@@ -135,6 +137,11 @@ impl Controller {
     /// The latched fault.
     pub fn fault(&self) -> Option<Fault> {
         self.sequence.fault()
+    }
+
+    /// Energy in the brake in J, whole.
+    pub fn brake_energy_j(&self) -> u32 {
+        whole_u32(self.interlocks.brake_energy_j())
     }
 
     /// The parameters in use.
@@ -345,7 +352,7 @@ impl Controller {
             worst_link_interrupt_cycles: self.resources.worst_link_interrupt_cycles,
             worst_step_cycles: self.resources.worst_step_cycles,
             stack_used_bytes: self.resources.stack_used_bytes,
-            brake_energy_j: whole_u32(self.interlocks.brake_energy_j()),
+            brake_energy_j: self.brake_energy_j(),
             parameters: self.identity.parameters,
             estimating: self.estimation.estimating(),
             reset_flags: self.identity.reset_flags,

@@ -34,6 +34,7 @@ use crate::SAMPLE_S;
 use crate::board::{BridgeQuality, RawSample};
 use crate::conversion::Converted;
 use crate::encoder::Speed;
+use crate::number::nearest;
 use crate::stop::EmergencyStop;
 
 /// Vehicle speed in m/s above which a locked wheel is a fault.
@@ -169,6 +170,15 @@ impl Interlocks {
             brake_energy_j: self.brake_energy_j,
             ..Self::new(parameters)
         };
+    }
+
+    /// With this energy in the brake in J: as hot as before a reset.
+    #[must_use]
+    pub fn heated(self, brake_energy_j: u32) -> Self {
+        Self {
+            brake_energy_j: nearest(brake_energy_j),
+            ..self
+        }
     }
 
     /// Energy in the brake in J.

@@ -77,6 +77,8 @@ pub struct Bench {
     pub raw: RawSample,
     /// What the valves were told last.
     pub brake: BrakeOutput,
+    /// Energy in the brake in J, of what the valves were told and how fast the wheel truly turned, nothing cooled.
+    pub brake_energy_j: f64,
     /// Samples so far.
     pub samples: u64,
     /// Estimates that were compared bit for bit.
@@ -117,6 +119,7 @@ impl Bench {
             host: Host::new(),
             raw: RawSample::default(),
             brake: BrakeOutput::DUMPED,
+            brake_energy_j: 0.0,
             samples: 0,
             estimates_compared: 0,
             worst: Worst {
@@ -157,6 +160,7 @@ impl Bench {
     /// As [`Bench::sample`].
     pub fn sample_with(&mut self, link: &[u8]) -> Result<()> {
         let raw = self.rig.sample(self.brake);
+        self.brake_energy_j += 1e-3 * self.rig.brake_power_w(self.brake);
         self.raw = raw;
         let input = Input {
             raw,

@@ -24,6 +24,9 @@ pub struct Host {
     /// Whether it keeps the link alive by itself.
     pub alive: bool,
     keep_alive_samples: u64,
+    /// The wire repeats what was said last, instead of what the host says.
+    pub repeats: bool,
+    said: Vec<u8>,
     corruption: f64,
     random: ChaCha8Rng,
     /// Everything that it was told.
@@ -69,6 +72,8 @@ impl Host {
             last_word: 0,
             alive: true,
             keep_alive_samples: KEEP_ALIVE_SAMPLES,
+            repeats: false,
+            said: Vec::new(),
             corruption: 0.0,
             random: ChaCha8Rng::seed_from_u64(5),
             heard: Heard::default(),
@@ -131,8 +136,15 @@ impl Host {
             bytes = self.framed(Command::KeepAlive)?;
         }
         self.samples += 1;
-        if !bytes.is_empty() {
+        if self.repeats {
+            bytes = if self.samples.is_multiple_of(self.keep_alive_samples) {
+                self.said.clone()
+            } else {
+                Vec::new()
+            };
+        } else if !bytes.is_empty() {
             self.last_word = self.samples;
+            self.said.clone_from(&bytes);
         }
         self.corrupt(&mut bytes);
         Ok(bytes)

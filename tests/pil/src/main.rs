@@ -64,6 +64,7 @@ fn main() -> Result<()> {
         ),
         ("slip hold", Box::new(|| scenarios::slip_hold(image))),
         ("interlocks", Box::new(|| scenarios::interlocks(image))),
+        ("guards", Box::new(|| scenarios::guards(image))),
         ("byte by byte", Box::new(|| scenarios::byte_by_byte(image))),
         ("corruption", Box::new(|| scenarios::corruption(image))),
         (

@@ -65,6 +65,7 @@ impl Native {
             slow_clock: false,
             set_up: true,
             parameters: Origin::BuiltIn,
+            brake_energy_j: 0,
         };
         let controller = Controller::new(&Parameters::default(), identity)
             .map_err(|error| anyhow!("default parameters: {error:?}"))?;

@@ -217,6 +217,11 @@ impl Rig {
         self.read(normal_force_n, brake)
     }
 
+    /// Power in W of the torque that the valves ask for.
+    pub fn brake_power_w(&self, brake: BrakeOutput) -> f64 {
+        self.demand_nm(brake) * self.plant.state().wheel_speed_rad_s
+    }
+
     fn demand_nm(&self, brake: BrakeOutput) -> f64 {
         if !brake.hold_pressure {
             return 0.0;

@@ -136,6 +136,7 @@ pub const IDENTITY: Identity = Identity {
     slow_clock: false,
     set_up: true,
     parameters: Origin::Stored,
+    brake_energy_j: 0,
 };
 
 impl Bench {

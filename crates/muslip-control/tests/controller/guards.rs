@@ -1,10 +1,11 @@
 //! What guards the rig beyond its sensors' plain ranges.
 
 use muslip_control::brake::BrakeOutput;
+use muslip_control::controller::Identity;
 use muslip_control::interlock::{DISAGREEING_SAMPLES, STUCK_SAMPLES};
 use muslip_record::{Answer, Command, Fault, Parameters, Profile, Program, Refusal, State};
 
-use crate::bench::{Bench, RAMP, Rig};
+use crate::bench::{Bench, IDENTITY, RAMP, Rig};
 
 /// Samples until the brake is dumped, and the fault.
 fn dumped(bench: &mut Bench, most: u32) -> (u32, Option<Fault>) {
@@ -211,4 +212,20 @@ fn a_wire_that_repeats_its_last_frames_does_not_keep_the_link_alive() {
         }
     }
     panic!("the brake was never dumped");
+}
+
+#[test]
+fn a_brake_that_was_hot_before_a_reset_forbids_arming_after_it_until_it_has_cooled() {
+    let hottest_j = Parameters::default().brake_heat.maximum_energy_j;
+    let mut bench = Bench::with(Identity {
+        brake_energy_j: 1_900_000,
+        ..IDENTITY
+    });
+    assert!(hottest_j < 1_900_000.0);
+    bench.run(50);
+    let hot = Answer::Refused(Refusal::Interlock(Fault::BrakeHot));
+    assert_eq!(bench.say(Command::Arm), hot);
+    // 5 % of it leave in 6.2 s.
+    bench.run(7_000);
+    assert_eq!(bench.say(Command::Arm), Answer::Done);
 }

@@ -96,6 +96,7 @@ impl Bench {
             slow_clock: false,
             set_up: true,
             parameters: origin,
+            brake_energy_j: 0,
         };
         let Ok(controller) = Controller::new(&parameters, identity) else {
             panic!("the defaults are refused");

@@ -138,12 +138,14 @@ pub fn free_run(image: &Path) -> Result<Found> {
     ))
 }
 
-/// How the program came to its end, as it tells in its hello after the reset that it made.
-fn told_after_reset(bench: &mut Bench) -> Result<PostMortem> {
+/// How the program came to its end, as it tells in its hello after the reset that it made; and the energy in J that is
+/// in its brake.
+fn told_after_reset(bench: &mut Bench) -> Result<(PostMortem, u32)> {
     bench.qemu.restarted()?;
     let hello = bench.host.framed(Command::Hello)?;
-    let mut reader = FrameReader::new();
-    for link in [&hello[..], &[], &[]] {
+    let status = bench.host.framed(Command::ReadStatus)?;
+    let (mut reader, mut end) = (FrameReader::new(), None);
+    for link in [&hello[..], &status[..], &[], &[]] {
         let output = bench.qemu.sample(&Input {
             raw: bench.rig.sample(bench.brake),
             link,
@@ -152,14 +154,19 @@ fn told_after_reset(bench: &mut Bench) -> Result<PostMortem> {
         })?;
         ensure!(output.brake == BrakeOutput::DUMPED);
         for byte in output.link {
-            if let Some(message) = reader.push::<Envelope<Telemetry>>(byte)
-                && let Telemetry::Hello(hello) = message?.body
-            {
-                return hello.end.context("no word of an end");
+            let Some(message) = reader.push::<Envelope<Telemetry>>(byte) else {
+                continue;
+            };
+            match message?.body {
+                Telemetry::Hello(hello) => end = hello.end,
+                Telemetry::Status(status) => {
+                    return Ok((end.context("no word of an end")?, status.brake_energy_j));
+                }
+                _ => {}
             }
         }
     }
-    bail!("no hello after the reset")
+    bail!("no status after the reset")
 }
 
 /// A hard fault, an exhausted stack and the end of the crystal in the image, and a panic in the image made for it, dump the brake before
@@ -176,6 +183,9 @@ pub fn fault_handlers(image: &Path, panic_image: &Path) -> Result<Found> {
         bench.until(State::Ramp, 1_000)?;
         bench.run(100)?;
         ensure!(bench.brake.hold_pressure);
+        bench.must(Command::ReadStatus)?;
+        let energy_j = bench.host.heard.status.context("no status")?.brake_energy_j;
+        ensure!(energy_j > 100, "{energy_j} J");
         bench.qemu.say(&message)?;
         let said = bench.qemu.hear()?;
         ensure!(
@@ -185,7 +195,12 @@ pub fn fault_handlers(image: &Path, panic_image: &Path) -> Result<Found> {
             },
             "{message:?}: {said:?}"
         );
-        let end = told_after_reset(&mut bench)?;
+        let (end, kept_j) = told_after_reset(&mut bench)?;
+        // A sample or two went on after that status, two cooled; whole joules.
+        ensure!(
+            (energy_j - 1..energy_j + 50).contains(&kept_j),
+            "{message:?}: {energy_j} J before, {kept_j} J after"
+        );
         ensure!(
             end.end == expected && end.state == State::Ramp && end.tick > 100,
             "{message:?}: {end:?}"
@@ -202,7 +217,7 @@ pub fn fault_handlers(image: &Path, panic_image: &Path) -> Result<Found> {
     );
     Ok(Found {
         line:
-            "hard fault, exhausted stack, crystal and panic; the first three told after their reset"
+            "hard fault, exhausted stack, crystal and panic; the first three told after their reset, the brake as hot as before"
                 .to_owned(),
         worst,
     })

@@ -112,6 +112,15 @@ fn injections() -> Vec<Injection> {
                 b.burn = CYCLES_PER_SAMPLE + 1_000
             })
         },
+        // The wire says the same over and over: nobody's word.
+        Injection {
+            holds: |b| b.host.silent_samples() > u64::from(SILENT_SAMPLES),
+            ..at_once(Fault::LinkSilent, |b| b.host.repeats = true)
+        },
+        Injection {
+            holds: |b| b.brake_energy_j > BEARS_J,
+            ..at_once(Fault::BrakeHot, |_| {})
+        },
         // A brake that grabs: the wheel needs some 40 ms to stop and may then stand for 200.
         Injection {
             holds: |b| b.rig.wheel_pulse_age_s() > f64::from(LOCK_TIME_S),
@@ -144,10 +153,17 @@ fn injections() -> Vec<Injection> {
     ]
 }
 
-/// Parameters that the filter starts with and fails on.
-fn set_filter_that_fails(bench: &mut Bench) -> Result<()> {
+/// Energy in J of a ramp's first quarter of a second.
+const BEARS_J: f64 = 1_000.0;
+
+/// Parameters under which a fault can come: an estimator that fails on its first update, a small brake.
+fn prepare(fault: Fault, bench: &mut Bench) -> Result<()> {
     let mut parameters = Parameters::default();
-    parameters.estimator.friction_std = 1e-30;
+    match fault {
+        Fault::EstimatorFault => parameters.estimator.friction_std = 1e-30,
+        Fault::BrakeHot => parameters.brake_heat.maximum_energy_j = BEARS_J as f32,
+        _ => return Ok(()),
+    }
     bench.run(50)?;
     bench.set_parameters(parameters)
 }
@@ -159,9 +175,7 @@ pub fn interlocks(image: &Path) -> Result<Found> {
     for injection in injections() {
         let fault = injection.fault;
         let mut bench = Bench::start(image, LAW, 4)?;
-        if fault == Fault::EstimatorFault {
-            set_filter_that_fails(&mut bench)?;
-        }
+        prepare(fault, &mut bench)?;
         // The skid that ends a ramp would end a lock as well.
         bench.begin(Profile {
             program: Program::Ramp { demand_per_s: 0.2 },
@@ -185,7 +199,7 @@ pub fn interlocks(image: &Path) -> Result<Found> {
         }
         ensure!(bench.brake == BrakeOutput::DUMPED);
         bench.rig.trouble = Trouble::default();
-        bench.host.alive = true;
+        (bench.host.alive, bench.host.repeats) = (true, false);
         bench.run(50)?;
         ensure!(bench.brake == BrakeOutput::DUMPED, "the dump does not last");
         bench.must(Command::ReadStatus)?;

@@ -6,6 +6,7 @@
 
 mod chip;
 mod estimators;
+mod guards;
 mod interlocks;
 mod link;
 mod runs;
@@ -16,6 +17,7 @@ use crate::bench::{Bench, Worst};
 
 pub use chip::{endurance, fault_handlers, free_run, log};
 pub use estimators::{compensation, worst_estimate};
+pub use guards::guards;
 pub use interlocks::interlocks;
 pub use link::{back_pressure, byte_by_byte, corruption, greets};
 pub use runs::{full_lock, ramps, slip_hold, steps};
