@@ -145,18 +145,29 @@ impl<F: NorFlash> Store<F> {
     fn is_torn_after(&mut self, address: u32) -> Result<bool, StoreError<F::Error>> {
         let sector = address / Self::sector_bytes();
         let next = address + const { address_of(SLOT_BYTES) };
-        let after = if next == (sector + 1) * Self::sector_bytes() {
+        if next == (sector + 1) * Self::sector_bytes() {
             // The sector is full: the next one goes into the other.
-            Self::slots(1 - sector.min(1)..2 - sector.min(1))
-        } else {
-            (next..(sector + 1) * Self::sector_bytes()).step_by(SLOT_BYTES)
-        };
-        for address in after {
+            return self.is_torn_anew(1 - sector.min(1));
+        }
+        for address in (next..(sector + 1) * Self::sector_bytes()).step_by(SLOT_BYTES) {
             if matches!(self.content(address)?, Content::Torn) {
                 return Ok(true);
             }
         }
         Ok(false)
+    }
+
+    /// Whether a sector was torn since it was left: while it was erased, or in its first slot after that. A sector is
+    /// left when it is full, and begins with a whole slot; what was torn in it before then is of no interest.
+    fn is_torn_anew(&mut self, sector: u32) -> Result<bool, StoreError<F::Error>> {
+        let (mut torn, mut blank, mut begins_whole) = (false, false, None);
+        for address in Self::slots(sector..sector + 1) {
+            let content = self.content(address)?;
+            begins_whole.get_or_insert(matches!(content, Content::Whole(..)));
+            torn |= matches!(content, Content::Torn);
+            blank |= matches!(content, Content::Blank);
+        }
+        Ok(torn && (blank || begins_whole != Some(true)))
     }
 
     /// Addresses of all slots of these sectors.

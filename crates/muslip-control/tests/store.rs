@@ -284,6 +284,21 @@ fn a_slot_begun_in_the_other_sector_is_noticed_as_well() {
 }
 
 #[test]
+fn a_slot_that_was_torn_long_ago_in_the_other_sector_is_no_news() {
+    // Torn and saved again, in a sector that is then filled and left.
+    let mut flash = saved(2);
+    flash.bytes[SLOT_BYTES + 40] ^= 1;
+    let mut store = Store::new(flash);
+    let mut seen = 0;
+    for number in 3..40 {
+        store.save(&numbered(number)).unwrap();
+        assert_eq!(store.load(), Ok(Some(newest(number))), "{number}");
+        seen += 1;
+    }
+    assert_eq!(seen, 37);
+}
+
+#[test]
 fn a_slot_of_another_schema_or_length_is_not_read_as_this() {
     for change in [
         |body: &mut [u8]| body[8] ^= 1,
@@ -306,4 +321,110 @@ fn whole_slots_with_parameters_outside_their_ranges_are_not_taken() {
     bad.wheel.effective_radius_m = -1.0;
     store.save(&bad).unwrap();
     assert_eq!(store.load(), Ok(before_the_newest(2)));
+}
+
+/// What a slot can hold, for an enumeration of all there is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Slot {
+    Blank,
+    Torn,
+    Whole(u8),
+    /// Of another schema: a firmware of before, or of after.
+    Foreign(u8),
+}
+
+/// A slot's bytes; its parameters are numbered as its sequence.
+fn bytes_of(slot: Slot) -> Vec<u8> {
+    let (sequence, foreign) = match slot {
+        Slot::Blank => return vec![0xFF; SLOT_BYTES],
+        Slot::Torn => return vec![0x5A; SLOT_BYTES],
+        Slot::Whole(sequence) => (sequence, false),
+        Slot::Foreign(sequence) => (sequence, true),
+    };
+    let mut store = Store::new(Flash::<4>::blank());
+    store.save(&numbered(u16::from(sequence))).unwrap();
+    let mut flash = store.into_inner();
+    forge(&mut flash, 0, |body| {
+        body[4..8].copy_from_slice(&u32::from(sequence).to_le_bytes());
+        body[8] ^= u8::from(foreign);
+    });
+    flash.bytes[..SLOT_BYTES].to_vec()
+}
+
+/// Two sectors whose first six slots are spent on another schema; the last two of each hold these.
+fn flash_of(sectors: [[usize; 2]; 2], slots: &[(Slot, Vec<u8>)]) -> Flash {
+    let mut flash = Flash::blank();
+    let spent = bytes_of(Slot::Foreign(0));
+    for (sector, ends) in flash.bytes.chunks_mut(SECTOR).zip(sectors) {
+        for place in sector[..SECTOR - 2 * SLOT_BYTES].chunks_mut(SLOT_BYTES) {
+            place.copy_from_slice(&spent);
+        }
+        for (place, slot) in sector[SECTOR - 2 * SLOT_BYTES..]
+            .chunks_mut(SLOT_BYTES)
+            .zip(ends)
+        {
+            place.copy_from_slice(&slots[slot].1);
+        }
+    }
+    flash
+}
+
+#[test]
+fn whatever_four_slots_hold_the_newest_whole_one_is_loaded_and_a_save_is_found_again() {
+    let mut slots = vec![Slot::Blank, Slot::Torn];
+    slots.extend((1..=4).flat_map(|n| [Slot::Whole(n), Slot::Foreign(n)]));
+    let slots: Vec<_> = slots
+        .into_iter()
+        .map(|slot| (slot, bytes_of(slot)))
+        .collect();
+    let mut states = 0;
+    for state in 0..slots.len().pow(4) {
+        let at = |place: u32| state / slots.len().pow(place) % slots.len();
+        let ends = [[at(0), at(1)], [at(2), at(3)]];
+        let held = ends.as_flattened().iter().map(|&slot| slots[slot].0);
+        let sequences: Vec<u8> = held
+            .clone()
+            .filter_map(|slot| match slot {
+                Slot::Whole(n) | Slot::Foreign(n) => Some(n),
+                _ => None,
+            })
+            .collect();
+        // No two slots ever have the same sequence.
+        if (1..=4).any(|n| sequences.iter().filter(|&&other| other == n).count() > 1) {
+            continue;
+        }
+        states += 1;
+        let best = held
+            .filter_map(|slot| match slot {
+                Slot::Whole(n) => Some(u16::from(n)),
+                _ => None,
+            })
+            .max();
+        let flash = flash_of(ends, &slots);
+        let found = everything_loaded(&flash);
+        assert_eq!(
+            found.map(|loaded| loaded.parameters),
+            best.map(numbered),
+            "{ends:?}"
+        );
+        let newer = sequences
+            .iter()
+            .any(|&n| best.is_some_and(|best| u16::from(n) > best));
+        assert!(
+            !newer || found.is_some_and(|loaded| !loaded.newest),
+            "{ends:?}"
+        );
+        let mut store = Store::new(flash);
+        store.save(&numbered(9)).unwrap();
+        let found = store.load().unwrap().unwrap();
+        assert_eq!(found.parameters, numbered(9), "{ends:?}");
+        // A sector that was torn and is not full was torn in its erase, or is the one in use.
+        let is = |ends: [usize; 2], slot| ends.iter().any(|&end| slots[end].0 == slot);
+        let torn = ends
+            .iter()
+            .any(|&ends| is(ends, Slot::Torn) && is(ends, Slot::Blank));
+        assert!(found.newest || torn, "{ends:?}");
+    }
+    // Σ C(4,k) 4!/(4-k)! 2^k 2^(4-k): k slots with sequences, of two kinds, the others blank or torn.
+    assert_eq!(states, 3_344);
 }

@@ -246,3 +246,82 @@ proptest! {
         prop_assert_eq!(results.last(), Some(&Ok(envelope(worst_estimate()))));
     }
 }
+
+#[test]
+fn every_body_of_up_to_two_bytes_survives_its_frame() {
+    let mut buffer = [0; FRAME_BYTES];
+    for first in 0..=255_u8 {
+        let frame = encode(&[first], &mut buffer).unwrap().to_vec();
+        let mut reader = FrameReader::new();
+        let back: Vec<_> = frame
+            .iter()
+            .filter_map(|&b| reader.push::<[u8; 1]>(b))
+            .collect();
+        assert_eq!(back, [Ok([first])]);
+        for second in 0..=255 {
+            let body = [first, second];
+            let frame = encode(&body, &mut buffer).unwrap();
+            assert_eq!(
+                frame.iter().position(|&byte| byte == 0),
+                Some(frame.len() - 1)
+            );
+            let mut reader = FrameReader::new();
+            let back: Vec<_> = frame
+                .iter()
+                .filter_map(|&b| reader.push::<[u8; 2]>(b))
+                .collect();
+            assert_eq!(back, [Ok(body)]);
+        }
+    }
+}
+
+#[test]
+fn every_byte_of_a_frame_changed_to_every_other_and_every_cut_of_it_is_seen() {
+    let mut buffer = [0; FRAME_BYTES];
+    let whole = encode(&envelope(worst_sample()), &mut buffer)
+        .unwrap()
+        .to_vec();
+    let last = whole.len() - 1;
+    for at in 0..last {
+        for value in (0..=255).filter(|&value| value != whole[at]) {
+            let mut bytes = whole.clone();
+            bytes[at] = value;
+            let results = read(&bytes);
+            assert!(
+                results.iter().all(Result::is_err),
+                "{at} {value}: {results:?}"
+            );
+        }
+        let cut = [&whole[..at], &[0]].concat();
+        assert!(read(&cut).iter().all(Result::is_err), "{at}");
+        let begun_late = &whole[at + 1..];
+        assert!(read(begun_late).iter().all(Result::is_err), "{at}");
+    }
+}
+
+#[test]
+fn after_every_short_stream_of_bytes_that_matter_the_next_frame_is_read() {
+    // What ends a frame, what points one, two and as far ahead as COBS goes, and a plain byte.
+    const BYTES: [u8; 5] = [0, 1, 2, 0xFF, 7];
+    let mut buffer = [0; FRAME_BYTES];
+    let frame = encode(&envelope(worst_estimate()), &mut buffer)
+        .unwrap()
+        .to_vec();
+    let mut streams = 0;
+    for length in 0..=7 {
+        for stream in 0..BYTES.len().pow(length) {
+            let mut bytes: Vec<u8> = (0..length)
+                .map(|at| BYTES[stream / BYTES.len().pow(at) % BYTES.len()])
+                .collect();
+            bytes.push(0);
+            let ended = bytes.iter().filter(|&&byte| byte == 0).count();
+            bytes.extend_from_slice(&frame);
+            let results = read(&bytes);
+            assert_eq!(results.last(), Some(&Ok(envelope(worst_estimate()))));
+            assert!(results.len() <= ended + 1);
+            assert!(results[..results.len() - 1].iter().all(Result::is_err));
+            streams += 1;
+        }
+    }
+    assert_eq!(streams, 97_656);
+}
