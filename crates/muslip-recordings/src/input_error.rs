@@ -69,6 +69,16 @@ pub enum InputProblem {
         /// Cells of this row.
         found: usize,
     },
+    /// A column in memory whose length is not that of the others.
+    #[error("{column}: {found} values where the first column has {expected}")]
+    ColumnLength {
+        /// Name of the column.
+        column: String,
+        /// Values of the first column.
+        expected: usize,
+        /// Values of this one.
+        found: usize,
+    },
     /// A cell that is neither a number nor missing.
     #[error("{column}: {cell} is not a number")]
     NotANumber {

@@ -12,7 +12,7 @@ use muslip_formats::map::Map;
 use rayon::prelude::*;
 
 use crate::input_error::{InputError, InputProblem};
-use crate::recording::{Channel, Header, Recording, Required};
+use crate::recording::{Channel, Header, Memory, Recording, Required};
 use crate::rig_file::RigFile;
 
 /// Rows between two reports of progress.
@@ -77,7 +77,15 @@ pub fn recording_mapped(
     required: Required,
     map: Option<&Map>,
 ) -> Result<Loaded, InputError> {
-    recording_reporting(path, required, map, &|_| {})
+    of_recording(Recording::open_mapped(path, map)?, required, &|_| {})
+}
+
+/// As [`recording`], of a recording that is open.
+///
+/// # Errors
+/// As [`Recording::rows`] and [`crate::recording::Rows::next_row`].
+pub fn opened(recording: Recording, required: Required) -> Result<Loaded, InputError> {
+    of_recording(recording, required, &|_| {})
 }
 
 /// As [`recording`], without what had to be mended.
@@ -89,18 +97,16 @@ pub fn run(path: &Path, required: Required) -> Result<campaign::Run, InputError>
 }
 
 /// As [`recording`]; `bytes_read` receives the number of bytes read since its last call.
-fn recording_reporting(
-    path: &Path,
+fn of_recording(
+    mut recording: Recording,
     required: Required,
-    map: Option<&Map>,
     bytes_read: &(dyn Fn(u64) + Sync),
 ) -> Result<Loaded, InputError> {
-    let mut recording = Recording::open_mapped(path, map)?;
+    let path = recording.path().to_owned();
     let name = path.display().to_string();
-    let converted = recording.converted();
-    let conversion: Vec<Fault> = converted
-        .into_iter()
-        .flat_map(|converted| &converted.faults)
+    let conversion: Vec<Fault> = recording
+        .conversion_faults()
+        .iter()
         .map(|fault| Fault {
             recording: name.clone(),
             channel: fault.column.clone(),
@@ -119,7 +125,7 @@ fn recording_reporting(
                 for column in &mut columns {
                     column.shrink_to_fit();
                 }
-                let mut loaded = in_order(path, &header, columns);
+                let mut loaded = in_order(&path, &header, columns);
                 loaded.faults.extend(conversion);
                 return Ok(loaded);
             };
@@ -287,24 +293,72 @@ pub fn campaign_mapped(
     progress: &(dyn Fn(f64) + Sync),
 ) -> Result<Campaign, InputError> {
     refuse_twice(recordings)?;
-    let rig = rig(&RigFile::read(rig_path)?);
+    let rig = RigFile::read(rig_path)?;
     let map = crate::map_file::chosen(map_path, Some(rig_path))?;
-    let total: u64 = recordings
-        .iter()
-        .filter_map(|path| fs::metadata(path).ok())
-        .map(|metadata| metadata.len())
-        .sum();
+    let sources: Vec<Source> = recordings.iter().cloned().map(Source::File).collect();
+    campaign_of(&rig, &sources, map.as_ref(), progress)
+}
+
+/// Where a recording is.
+#[derive(Debug, Clone)]
+pub enum Source {
+    /// In a file of any format.
+    File(PathBuf),
+    /// In memory.
+    Memory(Memory),
+}
+
+impl Source {
+    /// Opens it; a map names the channels of a file.
+    ///
+    /// # Errors
+    /// As [`Recording::open_mapped`].
+    pub fn open(&self, map: Option<&Map>) -> Result<Recording, InputError> {
+        match self {
+            Self::File(path) => Recording::open_mapped(path, map),
+            Self::Memory(memory) => Ok(Recording::of_memory(memory.clone())),
+        }
+    }
+
+    /// The file, or the name that stands for one.
+    #[must_use]
+    pub fn path(&self) -> &Path {
+        match self {
+            Self::File(path) => path,
+            Self::Memory(memory) => memory.path(),
+        }
+    }
+
+    fn length_bytes(&self) -> u64 {
+        match self {
+            Self::File(path) => fs::metadata(path).map_or(0, |metadata| metadata.len()),
+            Self::Memory(memory) => Recording::of_memory(memory.clone()).length_bytes(),
+        }
+    }
+}
+
+/// As [`campaign()`], of recordings wherever they are, and of a rig that was read.
+///
+/// # Errors
+/// The first [`InputError`] of the recordings in the order given.
+pub fn campaign_of(
+    rig_file: &RigFile,
+    sources: &[Source],
+    map: Option<&Map>,
+    progress: &(dyn Fn(f64) + Sync),
+) -> Result<Campaign, InputError> {
+    let total: u64 = sources.iter().map(Source::length_bytes).sum();
     let done = AtomicU64::new(0);
     let bytes_read = |bytes: u64| {
         let now = done.fetch_add(bytes, Ordering::Relaxed) + bytes;
         progress((now as f64 / total.max(1) as f64).min(1.0));
     };
-    let loaded: Vec<Result<Loaded, InputError>> = recordings
+    let loaded: Vec<Result<Loaded, InputError>> = sources
         .par_iter()
-        .map(|path| recording_reporting(path, Required::DragIncluded, map.as_ref(), &bytes_read))
+        .map(|source| of_recording(source.open(map)?, Required::DragIncluded, &bytes_read))
         .collect();
     let mut campaign = Campaign {
-        rig,
+        rig: rig(rig_file),
         runs: Vec::with_capacity(loaded.len()),
         faults: Vec::new(),
     };
@@ -320,7 +374,10 @@ pub fn campaign_mapped(
 }
 
 /// One file under two names would be fitted and then serve as its own proof.
-fn refuse_twice(recordings: &[PathBuf]) -> Result<(), InputError> {
+///
+/// # Errors
+/// [`InputError`] of a file that is given a second time.
+pub fn refuse_twice(recordings: &[PathBuf]) -> Result<(), InputError> {
     let mut seen: HashMap<PathBuf, &PathBuf> = HashMap::new();
     for path in recordings {
         let file = fs::canonicalize(path).unwrap_or_else(|_| path.clone());

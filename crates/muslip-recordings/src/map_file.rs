@@ -13,8 +13,15 @@ use crate::toml_file;
 /// [`InputError`] with line and column: the file is missing, not UTF-8, not TOML, has a key that a map does not have, or a value that cannot be
 /// meant.
 pub fn read(path: &Path) -> Result<Map, InputError> {
-    let bytes = toml_file::bytes_of(path)?;
-    let text = toml_file::text_of(path, &bytes)?;
+    parse(path, &toml_file::bytes_of(path)?)
+}
+
+/// Checks the text of a map; `path` is only named in errors.
+///
+/// # Errors
+/// As [`read`].
+pub fn parse(path: &Path, bytes: &[u8]) -> Result<Map, InputError> {
+    let text = toml_file::text_of(path, bytes)?;
     let map: Map = toml_file::parsed(path, text)?;
     map.check()
         .map_err(|reason| InputError::whole_file(path, InputProblem::Toml(reason)))?;
@@ -26,9 +33,14 @@ pub fn read(path: &Path) -> Result<Map, InputError> {
 /// # Errors
 /// As [`read`].
 pub fn of_rig(path: &Path) -> Result<Option<Map>, InputError> {
-    let map = read(path)?;
+    Ok(in_use(read(path)?))
+}
+
+/// A map, where it says anything.
+#[must_use]
+pub fn in_use(map: Map) -> Option<Map> {
     let empty = map.channels.is_empty() && map.time == muslip_formats::map::Time::default();
-    Ok((!empty).then_some(map))
+    (!empty).then_some(map)
 }
 
 /// The map that recordings are read by: a file of its own, or else the rig file's.

@@ -6,7 +6,7 @@ mod model;
 mod record;
 mod trace;
 
-use std::io::{self, Write};
+use std::io;
 
 use muslip::filter::efficient::{self, EfficientFilter};
 use muslip::filter::mu_slip::{Config, ConfigError, Estimate, Fusion, MuSlipFilter, Range, State};
@@ -24,7 +24,7 @@ use serde_json::json;
 pub use consistency::{Consistency, ConsistencyTest, Verdict, mean_nis_band};
 pub use model::{ModelUse, ModelledMechanism, Operation};
 pub use record::{Frame, Record, Sample, Update};
-pub use trace::{TraceFormat, TraceRow, TraceWriter};
+pub use trace::{TraceFormat, TraceRow, TraceSink, TraceWriter};
 
 use crate::measure::{FrictionNoise, Skipped, Survey, for_each_row};
 use record::Recorder;
@@ -115,12 +115,12 @@ pub enum EstimateError {
 /// [`EstimateError::Input`] for a malformed recording or one without a usable sample,
 /// [`EstimateError::Model`] for a model that cannot be compensated, [`EstimateError::Trace`] with what the
 /// trace's sink answers.
-pub fn estimate<W: Write>(
+pub fn estimate<S: TraceSink>(
     recording: &mut Recording,
     rig: &RigFile,
     options: EstimateOptions,
     model: Option<&Repaired>,
-    trace: Option<&mut TraceWriter<W>>,
+    trace: Option<&mut S>,
     progress: &mut dyn FnMut(u64),
 ) -> Result<EstimateResult, EstimateError> {
     let mut survey = Survey::of(recording, rig, progress)?;
@@ -314,12 +314,12 @@ struct Run {
     record: Record,
 }
 
-fn run<W: Write>(
+fn run<S: TraceSink>(
     mut filter: Filter,
     mut front: Front,
     recording: &mut Recording,
     survey: &Survey,
-    mut trace: Option<&mut TraceWriter<W>>,
+    mut trace: Option<&mut S>,
     progress: &mut dyn FnMut(u64),
 ) -> Result<Run, EstimateError> {
     let mut test = ConsistencyTest::default();
@@ -417,6 +417,15 @@ impl EstimateResult {
             (None, EstimatorKind::Efficient) => RangeSource::Recording,
             (None, EstimatorKind::Article) => RangeSource::Default,
         }
+    }
+
+    /// As [`EstimateResult::to_json`], with what was done to read a file of another format, where anything was.
+    pub fn to_json_noting(&self, notes: &[String]) -> serde_json::Value {
+        let mut json = self.to_json();
+        if let (false, Some(object)) = (notes.is_empty(), json.as_object_mut()) {
+            object.insert("read".to_owned(), notes.into());
+        }
+        json
     }
 
     /// The result as the contract's JSON object, `muslip.estimate/1`, with a few fields more.

@@ -36,6 +36,22 @@ pub struct TraceRow {
     pub nis: f64,
 }
 
+/// Who takes the estimate after every used sample.
+pub trait TraceSink {
+    /// Takes one row.
+    ///
+    /// # Errors
+    /// The sink's own.
+    fn row(&mut self, row: &TraceRow) -> io::Result<()>;
+}
+
+impl TraceSink for Vec<TraceRow> {
+    fn row(&mut self, row: &TraceRow) -> io::Result<()> {
+        self.push(*row);
+        Ok(())
+    }
+}
+
 /// How a trace is written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum TraceFormat {
@@ -88,11 +104,21 @@ impl<W: Write> TraceWriter<W> {
         })
     }
 
-    /// Writes one row, every number with all its digits.
+    /// Ends the trace and gives the sink back.
     ///
     /// # Errors
     /// What the sink answers.
-    pub fn row(&mut self, row: &TraceRow) -> io::Result<()> {
+    pub fn finish(mut self) -> io::Result<W> {
+        if self.format == TraceFormat::Json {
+            self.sink.write_all(b"\n]\n")?;
+        }
+        Ok(self.sink)
+    }
+}
+
+impl<W: Write> TraceSink for TraceWriter<W> {
+    /// Writes one row, every number with all its digits.
+    fn row(&mut self, row: &TraceRow) -> io::Result<()> {
         match self.format {
             TraceFormat::Csv => writeln!(
                 self.sink,
@@ -123,17 +149,6 @@ impl<W: Write> TraceWriter<W> {
         }
         self.rows += 1;
         Ok(())
-    }
-
-    /// Ends the trace and gives the sink back.
-    ///
-    /// # Errors
-    /// What the sink answers.
-    pub fn finish(mut self) -> io::Result<W> {
-        if self.format == TraceFormat::Json {
-            self.sink.write_all(b"\n]\n")?;
-        }
-        Ok(self.sink)
     }
 }
 

@@ -3,13 +3,12 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use muslip_formats::listing::{Listed, listed};
-use muslip_formats::{SourceFile, roles};
-use muslip_recordings::input_error::InputError;
+use muslip_analysis::channels::{Listing, listing};
+use muslip_formats::listing::Listed;
+use muslip_formats::roles;
 use muslip_recordings::map_file;
 use muslip_recordings::output::write_file;
 use muslip_recordings::recording::Required;
-use serde_json::json;
 
 use super::failure::Failure;
 use super::terminal::Terminal;
@@ -40,48 +39,36 @@ pub(super) struct Arguments {
 
 pub(super) fn run(arguments: &Arguments, terminal: &mut Terminal) -> Result<(), Failure> {
     let map = arguments.map.as_deref().map(map_file::read).transpose()?;
-    let mut file = SourceFile::open(&arguments.file).map_err(InputError::from)?;
-    // What a map or a guess cannot find concerns the other commands; here it is listed.
-    let mut faults = Vec::new();
-    let roles = match map.as_ref().map(|map| roles::by_map(file.channels(), map)) {
-        Some(Ok(roles)) => roles,
-        Some(Err(problem)) => {
-            faults.push(problem.in_words());
-            roles::Roles::default()
-        }
-        None => roles::guess(file.channels()),
-    };
-    let (channels, told) = listed(&mut file, &roles);
-    faults.splice(0..0, told);
+    let listing = listing(&arguments.file, map.as_ref())?;
+    let Listing {
+        channels,
+        roles,
+        faults,
+        ..
+    } = &listing;
     if let Some(path) = &arguments.write_map {
-        let time = map.map(|map| map.time).unwrap_or_default();
-        let mut text = roles.as_map(file.channels(), &time).to_toml();
-        for (_, reason) in needed(&roles).filter(|_| roles.guessed) {
+        let mut text = listing.map.to_toml();
+        for (_, reason) in needed(roles).filter(|_| roles.guessed) {
             text.push_str(&format!("# {reason}\n"));
         }
         write_file(path, text.as_bytes())?;
     }
     if arguments.json {
-        return terminal.json(&json!({
-            "schema": "muslip.channels/1",
-            "format": file.format().word(),
-            "start_time": file.start_time(),
-            "channels": channels.iter().map(as_json).collect::<Vec<_>>(),
-            "faults": faults,
-        }));
+        return terminal.json(&listing.to_json());
     }
-    let start = file
-        .start_time()
+    let start = listing
+        .start_time
+        .as_ref()
         .map_or(String::new(), |start| format!(", started {start}"));
     let count = channels.len();
     terminal.headline(&format!(
         "{}: {}{start}, {count} channels",
         arguments.file.display(),
-        file.format().word()
+        listing.format.word()
     ))?;
     terminal.line("")?;
-    table(&channels, terminal)?;
-    for fault in &faults {
+    table(channels, terminal)?;
+    for fault in faults {
         terminal.line(&format!("fault: {fault}"))?;
     }
     if roles.guessed {
@@ -89,7 +76,7 @@ pub(super) fn run(arguments: &Arguments, terminal: &mut Terminal) -> Result<(), 
         terminal.line(
             "Columns are guessed from names and units; --write-map map.toml saves the guess.",
         )?;
-        for (_, reason) in needed(&roles) {
+        for (_, reason) in needed(roles) {
             terminal.paragraph(reason)?;
         }
     }
@@ -111,26 +98,6 @@ fn needed(roles: &roles::Roles) -> impl Iterator<Item = &(&'static str, String)>
         .refused
         .iter()
         .filter(move |(role, _)| is_needed(role))
-}
-
-fn as_json(one: &Listed) -> serde_json::Value {
-    let channel = &one.channel;
-    let mut value = json!({
-        "group": channel.group,
-        "name": channel.name,
-        "unit": channel.unit,
-        "samples": one.samples,
-        "first_s": one.first_s,
-        "last_s": one.last_s,
-        "rate_hz": one.rate_hz,
-        "invalid": one.invalid,
-        "comment": channel.comment,
-        "kind": channel.kind.word(),
-    });
-    if let (Some(role), Some(object)) = (&one.role, value.as_object_mut()) {
-        object.insert("role".into(), json!(role));
-    }
-    value
 }
 
 /// One row a channel, under a header.

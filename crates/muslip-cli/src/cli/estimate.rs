@@ -167,11 +167,7 @@ pub(super) fn run(arguments: &Arguments, terminal: &mut Terminal) -> Result<(), 
         return Ok(());
     }
     if arguments.json {
-        let mut json = result.to_json();
-        if let (false, Some(object)) = (notes.is_empty(), json.as_object_mut()) {
-            object.insert("read".into(), notes.into());
-        }
-        return terminal.json(&json);
+        return terminal.json(&result.to_json_noting(&notes));
     }
     terminal.headline(&format!(
         "{}: {}",

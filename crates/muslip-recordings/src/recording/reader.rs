@@ -9,6 +9,7 @@ use muslip::sample::RigSample;
 use muslip_formats::map::Map;
 
 use super::header::{Channel, Header, Required};
+use super::memory::Memory;
 use super::position::{Place, line_and_column};
 use super::table::Table;
 use super::utf8::{NotUtf8At, Utf8Reader};
@@ -16,16 +17,27 @@ use crate::input_error::{InputError, InputProblem, quoted, shown};
 
 const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
 
-/// A recording on disk, to be read as often as needed.
+/// A recording on disk or in memory, to be read as often as needed.
 #[derive(Debug)]
 pub struct Recording {
     path: PathBuf,
-    file: File,
-    /// Where the text starts: after the byte order mark, if there is one.
-    text_start: u64,
     length_bytes: u64,
-    /// The columns, where the file is in another format than the contract's.
-    table: Option<Table>,
+    source: Source,
+}
+
+/// What the rows are in.
+#[derive(Debug)]
+enum Source {
+    /// A CSV of the contract.
+    Text {
+        file: File,
+        /// Where the text starts: after the byte order mark, if there is one.
+        text_start: u64,
+    },
+    /// A file in another format than the contract's.
+    Table(Table),
+    /// No file.
+    Memory(Memory),
 }
 
 impl Recording {
@@ -65,27 +77,52 @@ impl Recording {
             .read_to_end(&mut start)
             .map_err(fail)?;
         let text_start = if start == BYTE_ORDER_MARK { 3 } else { 0 };
-        let table = Table::of(path, &file, text_start, map)?;
+        let source = match Table::of(path, &file, text_start, map)? {
+            Some(table) => Source::Table(table),
+            None => Source::Text { file, text_start },
+        };
         Ok(Self {
             path: path.to_owned(),
-            text_start,
-            file,
             length_bytes,
-            table,
+            source,
         })
+    }
+
+    /// A recording that is in memory already.
+    #[must_use]
+    pub fn of_memory(memory: Memory) -> Self {
+        Self {
+            path: memory.path().to_owned(),
+            length_bytes: memory.length_bytes(),
+            source: Source::Memory(memory),
+        }
     }
 
     /// What was read, converted, interpolated, decimated or dropped to get the columns from a file of another format; empty for a CSV of the
     /// contract.
     pub fn notes(&self) -> &[String] {
-        self.table
-            .as_ref()
-            .map_or(&[], |table| &table.converted.notes)
+        match &self.source {
+            Source::Text { .. } => &[],
+            Source::Table(table) => &table.converted.notes,
+            Source::Memory(memory) => memory.notes(),
+        }
     }
 
     /// How the columns were made of a file of another format.
     pub fn converted(&self) -> Option<&muslip_formats::convert::Converted> {
-        self.table.as_ref().map(|table| &table.converted)
+        match &self.source {
+            Source::Table(table) => Some(&table.converted),
+            Source::Text { .. } | Source::Memory(_) => None,
+        }
+    }
+
+    /// What a diagnosis must know of how the columns were made.
+    pub fn conversion_faults(&self) -> &[muslip_formats::convert::Fault] {
+        match &self.source {
+            Source::Text { .. } => &[],
+            Source::Table(table) => &table.converted.faults,
+            Source::Memory(memory) => memory.faults(),
+        }
     }
 
     /// Size of a recording before it is opened, for progress bars: of a pipe, which can be opened only
@@ -119,20 +156,28 @@ impl Recording {
     /// [`InputError`] if the file is empty or its header lacks a required column, has one twice, or one
     /// without a name.
     pub fn rows(&mut self, required: Required) -> Result<Rows<'_>, InputError> {
-        if let Some(table) = &self.table {
-            table.has(&self.path, required)?;
-            let header = table.header.clone();
+        let pass = match &self.source {
+            Source::Table(table) => {
+                table.has(&self.path, required)?;
+                Some((table.header.clone(), Pass::Table(table)))
+            }
+            Source::Memory(memory) => {
+                memory.has(required)?;
+                Some((memory.header().clone(), Pass::Memory(memory)))
+            }
+            Source::Text { .. } => None,
+        };
+        if let Some((header, pass)) = pass {
             return Ok(Rows {
                 recording: self,
                 cells: vec![f64::NAN; header.names().len()],
                 header,
-                pass: Pass::Table(table),
+                pass,
                 rows_read: 0,
                 last_time_s: f64::NEG_INFINITY,
             });
         }
-        self.rewind()?;
-        let text = Utf8Reader::new(&self.file);
+        let text = Utf8Reader::new(self.rewound()?);
         let mut csv = csv::ReaderBuilder::new()
             .has_headers(false)
             .flexible(true)
@@ -180,11 +225,20 @@ impl Recording {
         Ok(header)
     }
 
-    fn rewind(&self) -> Result<(), InputError> {
-        (&self.file)
-            .seek(SeekFrom::Start(self.text_start))
-            .map(|_| ())
-            .map_err(|error| InputError::unreadable(&self.path, &error))
+    /// The file at the start of its text.
+    fn rewound(&self) -> Result<&File, InputError> {
+        let fail = |error| InputError::unreadable(&self.path, &error);
+        match &self.source {
+            Source::Text { file, text_start } => {
+                let mut at = file;
+                at.seek(SeekFrom::Start(*text_start)).map_err(fail)?;
+                Ok(file)
+            }
+            // Columns have no text to go back to, and nothing asks for it.
+            Source::Table(_) | Source::Memory(_) => {
+                Err(fail(io::Error::from(io::ErrorKind::Unsupported)))
+            }
+        }
     }
 
     fn error_at_cell(&self, record_from: u64, cell: usize, problem: InputProblem) -> InputError {
@@ -194,9 +248,9 @@ impl Recording {
     fn error_at(&self, place: Place, problem: InputProblem) -> InputError {
         // If the second look at the file fails, the problem is still told, at its beginning.
         let (line, column) = self
-            .rewind()
+            .rewound()
             .ok()
-            .and_then(|()| line_and_column(&self.file, place).ok())
+            .and_then(|file| line_and_column(file, place).ok())
             .unwrap_or((1, 1));
         InputError {
             path: self.path.clone(),
@@ -227,6 +281,7 @@ impl Recording {
 enum Pass<'a> {
     Text(Box<csv::Reader<Utf8Reader<&'a File>>>, ByteRecord),
     Table(&'a Table),
+    Memory(&'a Memory),
 }
 
 /// One pass over the rows of a recording.
@@ -250,11 +305,14 @@ impl Rows<'_> {
     pub fn bytes_read(&self) -> u64 {
         match &self.pass {
             Pass::Text(csv, _) => csv.get_ref().bytes_passed(),
-            Pass::Table(table) => {
-                let share = self.rows_read as f64 / table.rows().max(1) as f64;
-                (self.recording.length_bytes as f64 * share) as u64
-            }
+            Pass::Table(table) => self.share_of_bytes(table.rows()),
+            Pass::Memory(memory) => self.share_of_bytes(memory.rows()),
         }
+    }
+
+    fn share_of_bytes(&self, rows: usize) -> u64 {
+        let share = self.rows_read as f64 / rows.max(1) as f64;
+        (self.recording.length_bytes as f64 * share) as u64
     }
 
     /// Reads the next row; `None` after the last one.
@@ -273,6 +331,18 @@ impl Rows<'_> {
                 for (cell, column) in self.cells.iter_mut().zip(&table.converted.columns) {
                     *cell = column.get(row).copied().unwrap_or(f64::NAN);
                 }
+                self.rows_read += 1;
+                return Ok(Some(Row {
+                    header: &self.header,
+                    cells: &self.cells,
+                }));
+            }
+            Pass::Memory(memory) => {
+                let row = usize::try_from(self.rows_read).unwrap_or(usize::MAX);
+                if row >= memory.rows() {
+                    return Ok(None);
+                }
+                memory.copy_row(row, &mut self.cells);
                 self.rows_read += 1;
                 return Ok(Some(Row {
                     header: &self.header,
@@ -348,7 +418,7 @@ impl Rows<'_> {
     fn error(&self, cell: usize, problem: InputProblem) -> InputError {
         let record_from = match &self.pass {
             Pass::Text(_, record) => record.position().map_or(0, csv::Position::byte),
-            Pass::Table(_) => 0,
+            Pass::Table(_) | Pass::Memory(_) => 0,
         };
         self.recording.error_at_cell(record_from, cell, problem)
     }
