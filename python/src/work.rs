@@ -85,7 +85,8 @@ pub(crate) struct Estimate {
 impl Estimate {
     /// The columns of the trace as bytes, in the order of the contract.
     fn trace<'py>(&self, py: Python<'py>) -> PyResult<Vec<(&'static str, Bound<'py, PyBytes>)>> {
-        let columns: [(&'static str, fn(&TraceRow) -> f64); 13] = [
+        type Column = (&'static str, fn(&TraceRow) -> f64);
+        let columns: [Column; 13] = [
             ("time_s", |row| row.time_s),
             ("slip", |row| row.slip),
             ("friction", |row| row.friction),

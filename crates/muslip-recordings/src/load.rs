@@ -301,6 +301,10 @@ pub fn campaign_mapped(
 
 /// Where a recording is.
 #[derive(Debug, Clone)]
+#[expect(
+    clippy::large_enum_variant,
+    reason = "one a recording, beside all its samples"
+)]
 pub enum Source {
     /// In a file of any format.
     File(PathBuf),
