@@ -220,11 +220,11 @@ impl Recorded<'_> {
             if both || brake {
                 data.timing_std.brake = LEAST_STD_S;
             }
-            let like = Some(Guess::of(&judged.parts));
+            let like = Guess::Sizes(&judged.parts);
             judged = judge(&data, &judged.model, &[], like, effort)?;
         }
         let data = reconciled(data, &judged);
-        let like = Some(Guess::of(&judged.parts));
+        let like = Guess::Sizes(&judged.parts);
         let judged = judge(&data, &judged.model, &[], like, effort)?;
         Some((data, timing, judged))
     }
@@ -346,7 +346,7 @@ pub fn timed(
             noise_steps: if pass == 0 || last { 30 } else { 10 },
             noise_stride: noise_stride(&data),
         };
-        let before = guess.as_deref().map(Guess::of);
+        let before = guess.as_deref().map_or(Guess::None, Guess::Sizes);
         let judged = judge(&data, &model, &[], before, effort)?;
         let (shift, std) = shifts(&data, &judged)?;
         timing.asked(audit, shift, std);

@@ -11,7 +11,7 @@ use crate::data::Data;
 use crate::innovations::candidates::{Candidate, Table, table};
 use crate::innovations::dependence::Dependence;
 use crate::innovations::gram::total;
-use crate::innovations::hypothesis::{Effort, Guess, judge, noise_stride, table_grams};
+use crate::innovations::hypothesis::{Effort, judge_added, noise_stride, table_grams};
 use crate::innovations::noise::{BalanceParts, Slopes};
 use crate::innovations::rows::rows_of;
 use crate::innovations::screen::{Score, scores};
@@ -54,15 +54,10 @@ fn start_of(data: &Data, candidate: &Candidate, score: &Score) -> Vec<f64> {
         return p;
     };
     let bounds = data.catalogue.get(entry).parameters(&data.context);
-    if candidate.free.is_empty() {
-        // What is no effect's size cannot be scaled.
-        if p.len() == 1 && data.catalogue.get(entry).facts().amplitude == Some(0) {
-            p[0] *= score.coefficients[0].clamp(0.3, 3.0);
-        }
-    } else {
-        for (at, &i) in candidate.free.iter().enumerate() {
-            p[i] += score.coefficients[at];
-        }
+    // What starts as nothing moves from there, together with what stands; what is no effect's size cannot be scaled.
+    let sized = p.len() == 1 && data.catalogue.get(entry).facts().amplitude == Some(0);
+    if candidate.free.is_empty() && sized {
+        p[0] *= score.coefficients[0].clamp(0.3, 3.0);
     }
     for (p, b) in p.iter_mut().zip(bounds) {
         *p = p.clamp(b.low, b.high);
@@ -307,8 +302,7 @@ impl<'a> Screen<'a> {
                         Claim::Dependence(free)
                     }
                 };
-                let guess = Some(Guess::beside(so_far));
-                let judged = judge(data, &model, &extra, guess, effort(data))?;
+                let judged = judge_added(data, &model, &extra, so_far, effort(data))?;
                 Some(self.before.tried(claim, judged, self.size(*index)))
             })
             .collect();

@@ -183,7 +183,7 @@ pub fn decide(data: &Data, base: Judged, excluded: &[Id], untold: Untold) -> Dec
         rounds.push(trials);
         let Some(trial) = best else { break };
         taken_up.add(&trial);
-        chosen = settled(data, trial.judged);
+        chosen = settled(data, under_own_noise(data, trial.judged));
     }
     if chosen.model.terms.len() > 1 {
         chosen = without_idle(data, chosen, untold);
@@ -200,7 +200,7 @@ pub fn decide(data: &Data, base: Judged, excluded: &[Id], untold: Untold) -> Dec
 /// A model whose noise is fitted until it stays: what it is short of its best would count for what is tried beside it.
 fn settled(data: &Data, mut judged: Judged) -> Judged {
     for _ in 0..MOST_SETTLING {
-        let guess = Some(Guess::of(&judged.parts));
+        let guess = Guess::Sizes(&judged.parts);
         let Some(next) = judge(data, &judged.model, &judged.extra, guess, effort(data)) else {
             break;
         };
@@ -218,15 +218,19 @@ fn settled(data: &Data, mut judged: Judged) -> Judged {
 /// The model so far under noise like a trial's, where that is better: sizes of the noise that only the trial came
 /// upon are no gain of its.
 fn at_noise_of(data: &Data, so_far: &Judged, trial: &Trial) -> Option<Judged> {
-    let guess = Some(Guess::of(&trial.judged.parts));
+    let guess = Guess::Sizes(&trial.judged.parts);
     let again = judge(data, &so_far.model, &so_far.extra, guess, effort(data))?;
     (again.loss < so_far.loss - ALIKE_NATS).then_some(again)
 }
 
+/// A model that was judged under another's noise, judged anew under what its own force makes of it.
+fn under_own_noise(data: &Data, judged: Judged) -> Judged {
+    again(data, &judged.model, &judged.extra, &judged).unwrap_or(judged)
+}
+
 /// Judges a model anew from the noise of one that is like it.
 fn again(data: &Data, model: &Model, extra: &[Dependence], like: &Judged) -> Option<Judged> {
-    let guess = Some(Guess::of(&like.parts));
-    judge(data, model, extra, guess, effort(data))
+    judge(data, model, extra, Guess::Sizes(&like.parts), effort(data))
 }
 
 /// Takes names out that the others do not need. A free dependence is no other name: it may span any of them.
@@ -240,8 +244,7 @@ fn without_idle(data: &Data, chosen: Judged, untold: Untold) -> Judged {
     }
     let all = names.model.terms.len();
     while names.model.terms.len() > 1 {
-        let without = without_each(data, &mut names);
-        let Some(fewer) = without_least_needed(data, &names, without, untold) else {
+        let Some(fewer) = without_least_needed(data, &names, untold) else {
             break;
         };
         names = fewer;
@@ -252,41 +255,17 @@ fn without_idle(data: &Data, chosen: Judged, untold: Untold) -> Judged {
     again(data, &names.model, &chosen.extra, &names).unwrap_or(names)
 }
 
-/// The model without each of its names. One name fewer is never likelier: where it is, its noise is the better start
-/// for all of them, and the model is judged anew from there.
-fn without_each(data: &Data, names: &mut Judged) -> Vec<Option<Judged>> {
-    let without: Vec<Option<Judged>> = (0..names.model.terms.len())
-        .map(|at| {
-            let mut model = names.model.clone();
-            model.terms.remove(at);
-            again(data, &model, &[], names)
-        })
-        .collect();
-    for fewer in without.iter().flatten() {
-        if fewer.loss < names.loss
-            && let Some(better) = again(data, &names.model, &[], fewer)
-            && better.loss < names.loss
-        {
-            *names = better;
-        }
-    }
-    without
-}
-
 /// The model without the name that least speaks for among those that the others do not need; nothing where all are
 /// needed.
-fn without_least_needed(
-    data: &Data,
-    names: &Judged,
-    without: Vec<Option<Judged>>,
-    untold: Untold,
-) -> Option<Judged> {
-    let idle = without.into_iter().enumerate().filter_map(|(at, fewer)| {
-        let fewer = fewer?;
-        let entry = names.model.terms[at].entry;
-        let claim = Claim::Mechanism(data.catalogue.get(entry).id(), entry);
-        let before = Before::new(data, &fewer, untold, 0.0);
-        let trial = before.tried(claim, names.clone(), f64::INFINITY);
+fn without_least_needed(data: &Data, names: &Judged, untold: Untold) -> Option<Judged> {
+    let idle = (0..names.model.terms.len()).filter_map(|at| {
+        let mut model = names.model.clone();
+        let term = model.terms.remove(at);
+        let fewer = again(data, &model, &[], names)?;
+        // Both under one noise: that of the model without it, as when it was taken up.
+        let with = judge(data, &names.model, &[], Guess::Under(&fewer), effort(data))?;
+        let claim = Claim::Mechanism(data.catalogue.get(term.entry).id(), term.entry);
+        let trial = Before::new(data, &fewer, untold, 0.0).tried(claim, with, f64::INFINITY);
         (!needed(&trial)).then(|| (trial.weight(), fewer))
     });
     let least = idle.min_by(|a, b| a.0.total_cmp(&b.0));

@@ -2,11 +2,11 @@
 
 use crate::chain::timing::Untold;
 use crate::constants::{
-    DEPENDENCE_WORTH, INDIFFERENT_NATS, LEAST_EFFECT, LEAST_GAIN, LEAST_GAIN_AT_SENSORS,
-    LEAST_GAIN_OF_DEPENDENCE_AT_SENSORS, LEAST_MEMORY_S, LEAST_PREDICTED,
+    CLEARLY_PREDICTED, DEPENDENCE_WORTH, INDIFFERENT_NATS, LEAST_EFFECT, LEAST_GAIN,
+    LEAST_GAIN_AT_SENSORS, LEAST_GAIN_OF_DEPENDENCE_AT_SENSORS, LEAST_MEMORY_S, LEAST_PREDICTED,
     LEAST_PREDICTED_BY_DEPENDENCE, LEAST_T, LEAST_T_AT_SENSORS, LEAST_T_OF_DEPENDENCE,
-    LEAST_T_OF_DEPENDENCE_AT_SENSORS, LEAST_T_OF_LIKELIER, PRICE_OF_NAME, PRICE_OF_PARAMETER,
-    REAL_MEMORY_PREDICTED, REAL_MEMORY_T,
+    LEAST_T_OF_DEPENDENCE_AT_SENSORS, LEAST_T_OF_LIKELIER, LINED_UP_PREDICTED, MOST_AGAINST,
+    PRICE_OF_NAME, PRICE_OF_PARAMETER, REAL_MEMORY_PREDICTED, REAL_MEMORY_T,
 };
 use crate::data::Data;
 use crate::innovations::dependence::Dependence;
@@ -90,6 +90,8 @@ pub struct Trial {
     /// By how much the model with it predicts the drag better: minus the mean over runs of the logarithm of the mean
     /// square error over that without it. Infinite for what does not work through the force.
     pub predicts: f64,
+    /// Whether no unseen run speaks against it, at the noise as fitted and at the sensors'.
+    pub unanimous: [bool; 2],
     /// The model with it.
     pub judged: Judged,
 }
@@ -150,6 +152,13 @@ fn sum_and_t(gains: &[f64]) -> (f64, f64) {
     (gains.iter().sum(), mean_and_t(&roots).1)
 }
 
+/// Whether hardly any of these speaks against what all together show. An effect that few runs reach, a channel's limit
+/// or the speed's end, makes gains so uneven that no t shows it; but where it is not it costs nothing.
+fn unanimous(gains: &[f64]) -> bool {
+    let sum_of = |sign: f64| gains.iter().map(|g| (sign * g).max(0.0)).sum::<f64>();
+    gains.len() > 1 && sum_of(-1.0) < MOST_AGAINST * sum_of(1.0)
+}
+
 /// The model so far, as what a trial adds to it is weighed against it.
 pub struct Before<'a> {
     data: &'a Data,
@@ -202,7 +211,9 @@ impl<'a> Before<'a> {
         } else {
             f64::INFINITY
         };
-        let at_sensors = self.gained_at_sensors(&judged, per_run);
+        let own_gains = gains(&base.unseen, &judged.unseen, per_run);
+        let gains_at_sensors = self.gains_at_sensors(&judged, per_run);
+        let at_sensors = sum_and_t(&gains_at_sensors);
         let term = claim.mechanism().and_then(|(id, entry)| {
             let term = judged.model.terms.iter().find(|t| t.entry == entry)?;
             Some((id, entry, term.parameters.as_slice()))
@@ -226,7 +237,7 @@ impl<'a> Before<'a> {
             claim,
             gain: base.loss - judged.loss - price,
             price,
-            unseen: mean_and_t(&gains(&base.unseen, &judged.unseen, per_run)),
+            unseen: mean_and_t(&own_gains),
             first: !named || at_sensors.0 > self.taken_up,
             at_sensors,
             own,
@@ -235,15 +246,16 @@ impl<'a> Before<'a> {
             predicts,
             readings,
             size,
+            unanimous: [&own_gains, &gains_at_sensors].map(|gains| unanimous(gains)),
             judged,
         }
     }
 
-    fn gained_at_sensors(&self, with: &Judged, per_run: bool) -> (f64, f64) {
+    fn gains_at_sensors(&self, with: &Judged, per_run: bool) -> Vec<f64> {
         let (noise, before) = &self.at_sensors;
         match (before, with.unseen_under(self.data, noise)) {
-            (Some(before), Some(with)) => sum_and_t(&gains(before, &with, per_run)),
-            _ => (0.0, 0.0),
+            (Some(before), Some(with)) => gains(before, &with, per_run),
+            _ => Vec::new(),
         }
     }
 
@@ -335,7 +347,12 @@ pub fn needed(trial: &Trial) -> bool {
 fn seen_at_sensors(trial: &Trial) -> bool {
     let (sum, t) = trial.at_sensors;
     if trial.mechanism().is_some() {
-        return sum > LEAST_GAIN_AT_SENSORS && t > LEAST_T_AT_SENSORS;
+        // Runs that differ at random do not line up to leave so little of their differences.
+        let lined_up = trial.unanimous[1]
+            && trial.gain > 0.0
+            && trial.predicts.is_finite()
+            && trial.predicts > LINED_UP_PREDICTED;
+        return sum > LEAST_GAIN_AT_SENSORS && (t > LEAST_T_AT_SENSORS || lined_up);
     }
     trial.predicts > LEAST_PREDICTED_BY_DEPENDENCE && dependence_at_sensors(trial)
 }
@@ -357,13 +374,19 @@ pub fn left_open(trial: &Trial) -> bool {
 fn seen_on_unseen_runs(trial: &Trial) -> bool {
     let (mean, t) = trial.unseen;
     match trial.claim {
-        Claim::Mechanism(..) => mean > 0.0 && t >= LEAST_T,
+        Claim::Mechanism(..) => mean > 0.0 && (t >= LEAST_T || clear_where_it_is(trial)),
         // What says nothing of what it is has to be seen at the sensors' noise as well: fitted noise may have left it.
         Claim::Dependence(_) => {
             let at_sensors = trial.at_sensors.1 > LEAST_T_OF_DEPENDENCE_AT_SENSORS;
             mean > 0.0 && t >= LEAST_T_OF_DEPENDENCE && at_sensors
         }
     }
+}
+
+/// Whether no unseen run speaks against what is clear in some: the drag is predicted clearly better.
+fn clear_where_it_is(trial: &Trial) -> bool {
+    let better = trial.predicts.is_finite() && trial.predicts > CLEARLY_PREDICTED;
+    trial.unanimous[0] && better
 }
 
 #[cfg(test)]
@@ -386,6 +409,16 @@ mod tests {
         assert_eq!(gains(&before, &with, false), [3.0, -1.0]);
         // Halves that the claim says nothing of are no evidence either way.
         assert_eq!(gains(&before, &with, true), [1.0, -0.5]);
+    }
+
+    #[test]
+    fn runs_that_an_effect_does_not_reach_do_not_speak_against_it() {
+        // Of a force channel that clips in the last run alone: no t shows it.
+        let clipped = [-1.0, 0.5, 8.0, 2.0, 463.0];
+        assert!(unanimous(&clipped) && mean_and_t(&clipped).1 < LEAST_T);
+        assert!(!unanimous(&[9.0, 1.0, 22.0, -9.0, 4.0]));
+        // One run is no company, and nothing is not for anything.
+        assert!(!unanimous(&[40.0]) && !unanimous(&[]) && !unanimous(&[-3.0, -1.0]));
     }
 
     #[test]

@@ -29,6 +29,9 @@ use crate::split::Split;
 /// Called with the share of the work done (0..=1) and what is being done.
 pub type Progress<'a> = &'a (dyn Fn(f64, &str) + Sync);
 
+/// Most confidence in what unseen runs do not bear out.
+const DOUBTED: f64 = 0.5;
+
 /// Samples above which neighbours are averaged first: memory and time would grow without telling more of anything
 /// but the fastest effects.
 const MOST_SAMPLES: usize = 300_000;
@@ -180,13 +183,15 @@ impl Answer<'_> {
 
     /// What works through the force is not sure where the force is not predicted any better.
     fn doubt(&self, mechanisms: &mut [NamedMechanism]) {
-        for named in mechanisms {
+        for named in mechanisms.iter_mut() {
             let id = Id::parse(named.id);
             let mechanism = id.and_then(|id| self.data.catalogue.of(id));
             if mechanism.is_some_and(|m| m.facts().through_force) {
-                named.evidence.confidence = named.evidence.confidence.min(0.5);
+                named.evidence.confidence = named.evidence.confidence.min(DOUBTED);
             }
         }
+        // What unseen runs do not bear out is not the strongest, whatever it gained.
+        mechanisms.sort_by_key(|named| named.evidence.confidence <= DOUBTED);
     }
 
     /// The diagnosis, proven by what the argument came to without what was kept for that.

@@ -93,7 +93,7 @@ fn quiet_load(s: &Series) -> Vec<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::innovations::hypothesis::{Effort, judge};
+    use crate::innovations::hypothesis::{Effort, Guess, judge};
     use crate::innovations::noise::parts;
     use crate::innovations::rows::rows_of;
     use crate::innovations::toy::{CRITICAL, Noise, PEAK, stop};
@@ -105,7 +105,14 @@ mod tests {
             noise_steps: 15,
             noise_stride: 1,
         };
-        let mut base = judge(data, &Model::of_law(PEAK, CRITICAL), &[], None, effort).unwrap();
+        let mut base = judge(
+            data,
+            &Model::of_law(PEAK, CRITICAL),
+            &[],
+            Guess::None,
+            effort,
+        )
+        .unwrap();
         // The sensors' own sizes: fitted ones may call the speeds' noise the drag's.
         base.parts = parts(data, &Slopes::new(data, &base.model));
         base

@@ -7,7 +7,7 @@ mod place;
 mod sizes;
 mod unseen;
 
-use place::Place;
+use place::{Known, Place};
 
 pub use columns::table_grams;
 pub use judged::Judged;
@@ -19,34 +19,19 @@ use super::noise::BalanceParts;
 use crate::data::Data;
 use crate::model::Model;
 
-/// A first guess of the noise.
+/// What is known of a model's noise before it is judged.
 #[derive(Clone, Copy)]
-pub struct Guess<'a> {
-    /// As it was fitted to another model.
-    pub parts: &'a [BalanceParts],
-    /// Whether that model lacks the last term or dependence and nothing else: then the noise of a balance that this
-    /// one does not touch stays what it is.
-    pub added: bool,
-}
-
-impl<'a> Guess<'a> {
-    /// That of a model that differs in more than its last term.
-    #[must_use]
-    pub fn of(parts: &'a [BalanceParts]) -> Self {
-        Self {
-            parts,
-            added: false,
-        }
-    }
-
-    /// That of a model to which something is added.
-    #[must_use]
-    pub fn beside(judged: &'a Judged) -> Self {
-        Self {
-            parts: &judged.parts,
-            added: true,
-        }
-    }
+pub enum Guess<'a> {
+    /// Nothing.
+    None,
+    /// Its sizes, as fitted to another model.
+    Sizes(&'a [BalanceParts]),
+    /// As fitted to another model, to be compared with this one: by what the noise enters is held, for likelihoods are
+    /// of one noise or of none. A force that changes with the model would buy or sell readings by their noise.
+    Under(&'a Judged),
+    /// The same where that model lacks the last term or dependence and nothing else: then the noise of a balance that
+    /// this one does not touch stays what it is.
+    Beside(&'a Judged),
 }
 
 /// Fits and judges a model from this start under a first guess of the noise.
@@ -55,16 +40,56 @@ pub fn judge(
     data: &Data,
     start: &Model,
     extra: &[Dependence],
-    guess: Option<Guess<'_>>,
+    guess: Guess<'_>,
     effort: Effort,
 ) -> Option<Judged> {
-    let first = (guess.is_none()).then_some(effort);
-    let added = guess.is_some_and(|g| g.added);
-    Place::new(data, start.clone(), extra, guess.map(|g| g.parts), first)?
+    let known = match guess {
+        Guess::None => Known::Nothing(effort),
+        Guess::Sizes(parts) => Known::Sizes(parts),
+        Guess::Under(other) | Guess::Beside(other) => Known::Noise(&other.parts),
+    };
+    let added = matches!(guess, Guess::Beside(_));
+    Place::new(data, start.clone(), extra, known)?
         .descended(data, extra, effort.steps)?
         .refitted(data, extra, effort, added)?
         .descended(data, extra, effort.steps.div_ceil(2))?
         .judged(data, extra)
+}
+
+/// Judges a model to which something is added. Noise that was fitted without it may have swallowed it: its parameters are
+/// first sought where the noise is no larger than the sensors make plausible. Where that leads nowhere, they are sought
+/// from the start under the noise as it was fitted, which may leave them there: what is added is no worse than nothing.
+#[must_use]
+pub fn judge_added(
+    data: &Data,
+    start: &Model,
+    extra: &[Dependence],
+    so_far: &Judged,
+    effort: Effort,
+) -> Option<Judged> {
+    let at_sensors = capped(&so_far.parts);
+    let sought = Place::new(data, start.clone(), extra, Known::Noise(&at_sensors))
+        .and_then(|place| place.descended(data, extra, effort.steps))
+        .and_then(|place| {
+            judge(
+                data,
+                &place.into_model(),
+                extra,
+                Guess::Beside(so_far),
+                effort,
+            )
+        });
+    if sought
+        .as_ref()
+        .is_some_and(|found| found.loss < so_far.loss)
+    {
+        return sought;
+    }
+    let plain = judge(data, start, extra, Guess::Beside(so_far), effort);
+    match (sought, plain) {
+        (Some(a), Some(b)) => Some(if a.loss < b.loss { a } else { b }),
+        (a, b) => a.or(b),
+    }
 }
 
 #[cfg(test)]
@@ -83,9 +108,9 @@ mod tests {
             noise_stride: 1,
         };
         let law = Model::of_law(PEAK, CRITICAL);
-        let mut base = judge(&data, &law, &[], None, effort).unwrap();
+        let mut base = judge(&data, &law, &[], Guess::None, effort).unwrap();
         for _ in 0..3 {
-            let guess = Some(Guess::of(&base.parts));
+            let guess = Guess::Sizes(&base.parts);
             base = judge(&data, &base.model, &[], guess, effort).unwrap();
         }
         let mut tried = 0;
@@ -101,7 +126,7 @@ mod tests {
                 entry,
                 parameters: nothing,
             });
-            let Some(with) = judge(&data, &model, &[], Some(Guess::beside(&base)), effort) else {
+            let Some(with) = judge_added(&data, &model, &[], &base, effort) else {
                 continue;
             };
             tried += 1;

@@ -30,25 +30,31 @@ pub struct Place {
     solved: Solved,
     /// Twice the negative log likelihood here, free dependences and the chain's nuisances fitted.
     here: f64,
+    /// By what the noise enters is another model's, whatever this one is.
+    held: bool,
+}
+
+/// What is known of the noise.
+#[derive(Clone, Copy)]
+pub enum Known<'a> {
+    /// Nothing: the sensors' own sizes to start from, fitted with this effort.
+    Nothing(Effort),
+    /// Its sizes; by what it enters is the model's own.
+    Sizes(&'a [BalanceParts]),
+    /// Its sizes and by what it enters.
+    Noise(&'a [BalanceParts]),
 }
 
 impl Place {
-    /// `sizes` are those of the noise; where there are none, the sensors' own. `fitted` has them fitted.
-    pub fn new(
-        data: &Data,
-        model: Model,
-        extra: &[Dependence],
-        sizes: Option<&[BalanceParts]>,
-        fitted: Option<Effort>,
-    ) -> Option<Self> {
+    pub fn new(data: &Data, model: Model, extra: &[Dependence], known: Known<'_>) -> Option<Self> {
         let slopes = Slopes::new(data, &model);
-        let fresh = parts(data, &slopes);
-        let mut noise = match sizes {
-            Some(old) => with_sizes(fresh, old),
-            None => fresh,
+        let mut noise = match known {
+            Known::Nothing(_) => parts(data, &slopes),
+            Known::Sizes(old) => with_sizes(parts(data, &slopes), old),
+            Known::Noise(old) => old.to_vec(),
         };
         let table = table_of(data, &model, &slopes, extra);
-        if let Some(effort) = fitted {
+        if let Known::Nothing(effort) = known {
             for _ in 0..SWEEPS {
                 fit_in_turn(data, &table, &mut noise, &|_| true, false, effort);
             }
@@ -67,7 +73,18 @@ impl Place {
             sum,
             solved,
             here,
+            held: matches!(known, Known::Noise(_)),
         })
+    }
+
+    /// Another place under this one's noise.
+    fn another(&self, data: &Data, model: Model, extra: &[Dependence]) -> Option<Self> {
+        let known = if self.held {
+            Known::Noise(&self.noise)
+        } else {
+            Known::Sizes(&self.noise)
+        };
+        Self::new(data, model, extra, known)
     }
 
     /// Nats that the linear model would still gain.
@@ -88,7 +105,7 @@ impl Place {
             !added || touches(&self.table.columns[balance as usize], columns.clone())
         };
         fit_in_turn(data, &self.table, &mut self.noise, &touched, true, effort);
-        Self::new(data, self.model, extra, Some(&self.noise), None)
+        self.another(data, self.model.clone(), extra)
     }
 
     /// At most so many steps towards the best parameters, none uphill.
@@ -100,7 +117,7 @@ impl Place {
                 break;
             }
             let model = place.stepped(data, shrink);
-            let next = Self::new(data, model, extra, Some(&place.noise), None)?;
+            let next = place.another(data, model, extra)?;
             if next.here < place.here {
                 place = next;
                 shrink = f64::min(1.0, 2.0 * shrink);
@@ -111,21 +128,25 @@ impl Place {
         Some(place)
     }
 
+    /// The model.
+    pub fn into_model(self) -> Model {
+        self.model
+    }
+
     fn stepped(&self, data: &Data, shrink: f64) -> Model {
         let bounds = bounds(data, &self.model);
+        let own = own_parameters(&self.model);
+        // Parameters that go together go together: the whole way is cut, not the way of one.
+        let share = own.iter().zip(self.solved.coefficients.iter());
+        let share = share
+            .map(|(&index, by)| most_of_step(index, bounds[index]) / by.abs())
+            .filter(|share| share.is_finite())
+            .fold(shrink, f64::min);
         let mut p = self.model.vector();
-        for (at, index) in own_parameters(&self.model).into_iter().enumerate() {
+        for (&index, by) in own.iter().zip(self.solved.coefficients.iter()) {
             let (low, high) = bounds[index];
-            let most = if index < 2 {
-                0.4
-            } else if (high - low).is_finite() {
-                0.25 * (high - low)
-            } else {
-                f64::INFINITY
-            };
-            let by = (shrink * self.solved.coefficients[at]).clamp(-most, most);
             if by.is_finite() {
-                p[index] = (p[index] + by).clamp(low, high);
+                p[index] = (p[index] + share * by).clamp(low, high);
             }
         }
         self.model.with(&p)
@@ -158,4 +179,9 @@ impl Place {
             grams: self.grams,
         })
     }
+}
+
+/// The most that a parameter goes in one step.
+fn most_of_step(index: usize, (low, high): (f64, f64)) -> f64 {
+    if index < 2 { 0.4 } else { 0.25 * (high - low) }
 }
