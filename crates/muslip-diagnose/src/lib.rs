@@ -53,6 +53,7 @@ pub mod proof;
 pub mod repaired;
 mod separating;
 pub mod series;
+mod slip;
 mod smooth;
 mod split;
 mod turn;

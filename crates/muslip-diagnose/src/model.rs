@@ -4,6 +4,7 @@ use crate::data::{Catalogue, Listed};
 use crate::mechanism::{Context, Law, Stage, State};
 use crate::number::Number;
 use crate::series::{Channel, Series};
+use crate::slip::slip;
 
 /// Parameters that every tyre model has: logarithms of peak friction and slip at the peak, and three
 /// shares that say how the inputs are to be read between raw and smoothed (no physics: see `prepare`).
@@ -159,7 +160,7 @@ pub fn friction<T: Listed>(
         .map(|k| {
             if series.rolling[k] {
                 let radius = state.radius.as_ref().map_or(nominal_radius, |r| r[k]);
-                -(radius * state.omega[k] / state.speed[k]) + (1.0 + beyond)
+                slip(radius, state.omega[k], state.speed[k]) + beyond
             } else {
                 zero
             }

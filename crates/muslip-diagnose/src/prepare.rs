@@ -8,6 +8,7 @@ use core::ops::Range;
 use crate::campaign::{Rig, Run};
 use crate::cleaning::{clean, stretches};
 use crate::series::{Channel, DataFault, GAP_STEPS, Series};
+use crate::slip::slip;
 use crate::smooth::{Smoothed, difference_sigma, median_in_place, smooth};
 use crate::turn;
 
@@ -315,11 +316,7 @@ struct Sound {
 fn form_balances(series: &mut Series, rig: &Rig, sound: &Sound, breaks: &[bool]) {
     let (wheel, speed) = (&series.wheel.smooth, &series.speed.smooth);
     let load = &series.load.smooth;
-    let slip_sane = |k: usize| {
-        let v = speed[k];
-        let s = (v - rig.radius_m * wheel[k]) / v;
-        (-0.3..=1.3).contains(&s)
-    };
+    let slip_sane = |k: usize| (-0.3..=1.3).contains(&slip(rig.radius_m, wheel[k], speed[k]));
     let base_ok = |k: usize| {
         let finite = wheel[k].is_finite() && speed[k].is_finite() && load[k].is_finite();
         finite && sound.wheel[k] && sound.speed[k]

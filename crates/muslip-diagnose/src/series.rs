@@ -4,6 +4,7 @@ use core::ops::Range;
 
 use crate::balance::Balance;
 use crate::context::Context;
+use crate::slip::{self, slip};
 
 /// A step of so many typical ones is a gap, over which nothing is joined.
 pub(crate) const GAP_STEPS: f64 = 3.5;
@@ -116,7 +117,7 @@ impl Series {
     #[must_use]
     pub fn slip(&self, k: usize, radius: f64) -> f64 {
         if self.rolling[k] {
-            (self.speed.smooth[k] - radius * self.wheel.smooth[k]) / self.speed.smooth[k]
+            slip(radius, self.wheel.smooth[k], self.speed.smooth[k])
         } else {
             0.0
         }
@@ -142,11 +143,10 @@ impl Series {
         if !self.rolling[k] {
             return 0.0;
         }
-        let (v, omega) = (self.speed.smooth[k], self.wheel.smooth[k]);
-        let by_wheel = context.radius / v * self.wheel.sigma * self.wheel.variance_share[k].sqrt();
-        let by_speed = context.radius * omega / (v * v)
-            * self.speed.sigma
-            * self.speed.variance_share[k].sqrt();
+        let (wheel, speed) = (&self.wheel, &self.speed);
+        let [by_wheel, by_speed] = slip::slopes(context.radius, wheel.smooth[k], speed.smooth[k]);
+        let by_wheel = by_wheel * wheel.sigma * wheel.variance_share[k].sqrt();
+        let by_speed = by_speed * speed.sigma * speed.variance_share[k].sqrt();
         let [peak, critical] = context.nominal;
         let x = self.slip(k, context.radius) / critical;
         let slope = 2.0 * peak / critical * (1.0 - x * x) / (1.0 + x * x).powi(2);

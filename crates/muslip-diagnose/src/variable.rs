@@ -1,6 +1,7 @@
 //! What a residual may be a function of: the words of the contract, and any recorded column.
 
 use crate::data::Data;
+use crate::slip;
 
 /// A variable that a residual may depend on.
 #[derive(Clone, Debug, PartialEq)]
@@ -118,8 +119,12 @@ impl Variable {
                     if !s.rolling[k] {
                         return 0.0;
                     }
-                    let (v, omega) = (s.speed.smooth[k], s.wheel.smooth[k]);
-                    data.context.radius * (omega * s.speed.rate[k] / v - s.wheel.rate[k]) / v
+                    let speeds = [s.wheel.smooth[k], s.speed.smooth[k]];
+                    slip::rate(
+                        data.context.radius,
+                        speeds,
+                        [s.wheel.rate[k], s.speed.rate[k]],
+                    )
                 })
                 .collect(),
             Self::NormalForceRate => s.load.rate.clone(),

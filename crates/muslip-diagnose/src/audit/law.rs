@@ -10,6 +10,7 @@ use super::signal::{Signal, low_pass};
 use super::squares::{Balance, Solution, recoloured, refine};
 use super::vehicle::{constants_of, impulse_like, powers};
 use crate::campaign::Rig;
+use crate::slip::slip;
 
 /// Places of the unknowns.
 pub const PEAK: usize = 0;
@@ -99,7 +100,7 @@ impl Law<'_> {
         let law: Vec<f64> = (0..count)
             .map(|k| {
                 let v = speed[k].max(1e-3);
-                let s = 1.0 - self.rig.radius_m * omega[k] / v - x[OFFSET];
+                let s = slip(self.rig.radius_m, omega[k], v) - x[OFFSET];
                 let u = s / critical;
                 load[k] * x[PEAK] * 2.0 * u / (1.0 + u * u)
             })

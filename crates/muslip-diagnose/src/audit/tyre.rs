@@ -7,6 +7,7 @@ use super::constants::MOST_ROWS;
 use super::recording::Recording;
 use super::timing::Timings;
 use crate::campaign::Rig;
+use crate::slip::slip;
 
 /// Step of the grid of the fit, s.
 const STEP_S: f64 = 0.005;
@@ -101,7 +102,7 @@ impl Fitted {
                 };
                 let (omega_s, speed_s) = (slow(&run.wheel.signal, w), slow(&run.speed.signal, v));
                 let load_s = slow(&run.load.signal, 0.0);
-                let slip = |omega: f64, speed: f64| 1.0 - self.radius * omega / speed.max(1e-3);
+                let slip = |omega: f64, speed: f64| slip(self.radius, omega, speed.max(1e-3));
                 out.push(
                     (0..count)
                         .map(|k| Row {

@@ -8,6 +8,7 @@ use crate::mechanism::Balance;
 use crate::model::{Model, friction};
 use crate::number::finite_or_zero;
 use crate::series::Series;
+use crate::slip;
 
 /// Memory in s of the wheel speed's noise in the slip: so many of the smoother's windows, within bounds.
 const WINDOWS: f64 = 1.5;
@@ -90,8 +91,9 @@ impl Slopes {
                     slope = load * (after[k] - before[k]) / (2.0 * step);
                     bend = load * (after[k] - 2.0 * here[k] + before[k]) / (step * step);
                 }
-                all[0].push(finite_or_zero(-slope * radius / v));
-                all[1].push(finite_or_zero(slope * radius * omega / (v * v)));
+                let [by_wheel, by_speed] = slip::slopes(radius, omega, v);
+                all[0].push(finite_or_zero(slope * by_wheel));
+                all[1].push(finite_or_zero(slope * by_speed));
                 all[2].push(finite_or_zero(force));
                 all[3].push(finite_or_zero(slope));
                 all[4].push(finite_or_zero(bend));

@@ -7,6 +7,7 @@ use crate::mechanism::Balance;
 use crate::number::finite_or_zero;
 use crate::prepare::mean_twice_about;
 use crate::series::Series;
+use crate::slip;
 
 /// Second derivative of a smoothed channel from its rate.
 fn second(rate: &[f64], time: &[f64]) -> Vec<f64> {
@@ -168,8 +169,8 @@ impl<'a> Chain<'a> {
             if !s.rolling[k] {
                 return 0.0;
             }
-            let (v, omega) = (s.speed.smooth[k], s.wheel.smooth[k]);
-            let rate = radius * (omega * self.speed_rate[k] / (v * v) - self.wheel_rate[k] / v);
+            let speeds = [s.wheel.smooth[k], s.speed.smooth[k]];
+            let rate = slip::rate(radius, speeds, [self.wheel_rate[k], self.speed_rate[k]]);
             -0.5 * self.slopes.curvature[self.run][k] * rate * rate
         };
         self.columns(curve, zero, zero)
