@@ -5,7 +5,9 @@ from __future__ import annotations
 import doctest
 import json
 import os
+import pathlib
 import pickle
+import shutil
 import signal
 import subprocess
 import threading
@@ -13,6 +15,9 @@ import time
 
 import muslip
 import numpy as np
+import pandas
+import polars
+import pyarrow
 import pytest
 
 COMMAND = os.environ.get("MUSLIP_COMMAND")
@@ -116,7 +121,6 @@ def test_errors_are_the_commands_line_with_its_parts(files, tmp_path):
 
 
 def test_columns_are_read_where_they_lie(files):
-    pandas, polars, pyarrow = (pytest.importorskip(name) for name in ("pandas", "polars", "pyarrow"))
     rig, runs = files
     columns = {name: values.copy() for name, values in muslip.read(runs[0]).to_dict().items()}
     expected = muslip.estimate(muslip.Recording(columns), rig).to_dict()
@@ -137,7 +141,6 @@ def test_columns_are_read_where_they_lie(files):
 
 
 def test_a_map_names_the_columns_of_a_frame(files):
-    pytest.importorskip("pyarrow")
     rig, runs = files
     columns = muslip.read(runs[0]).to_dict()
     other = {"t": columns["time_s"], "n": columns["wheel_speed_rad_s"], "v": columns["vehicle_speed_m_s"],
@@ -187,6 +190,19 @@ def test_an_interrupt_ends_a_diagnosis_within_a_second(files):
         muslip.diagnose(runs, rig)
     assert time.monotonic() - sent[0] < 1.0
     thread.join()
+
+
+def test_the_readmes_lines_run(files, tmp_path, monkeypatch, capsys):
+    rig, runs = files
+    shutil.copy(rig, tmp_path / "rig.toml")
+    shutil.copy(runs[0], tmp_path / "run.csv")
+    monkeypatch.chdir(tmp_path)
+    for name in ("README.md", "python/README.md"):
+        text = (pathlib.Path(__file__).parents[2] / name).read_text()
+        lines = text.split("```python\n", 1)[1].split("```", 1)[0]
+        exec(lines, {})
+        peak = muslip.estimate("run.csv", "rig.toml").peak_friction
+        assert capsys.readouterr().out == f"{peak.value} +- {peak.std}\n", name
 
 
 def test_examples_of_the_docstrings():

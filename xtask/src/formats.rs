@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::PathBuf;
 
-use anyhow::{Context, Result};
+use anyhow::Result;
 
 use crate::setup;
 use crate::step::{CHECKED, cargo, command, root, run, target};
@@ -15,35 +15,8 @@ pub const FILES: &str = "MUSLIP_FORMATS_FILES";
 ///
 /// The programs are installed at the versions of tests/formats/requirements.txt into a virtual environment below the target folder, once.
 pub fn write() -> Result<PathBuf> {
-    setup::for_formats()?;
     let sources = root().join("tests/formats");
-    let requirements = sources.join("requirements.txt");
-    let wanted = fs::read_to_string(&requirements).context("tests/formats/requirements.txt")?;
-    let environment = target().join("tools").join("formats");
-    let stamp = environment.join("installed.txt");
-    let python = environment.join("bin").join("python");
-    if fs::read_to_string(&stamp).ok().as_ref() != Some(&wanted) {
-        let mut make = command("python3", &["-m", "venv", "--clear"]);
-        make.arg(&environment);
-        run(
-            "make a Python environment for the files of other programs",
-            make,
-        )?;
-        let mut install = command(
-            &python.to_string_lossy(),
-            &[
-                "-m",
-                "pip",
-                "install",
-                "--quiet",
-                "--disable-pip-version-check",
-                "-r",
-            ],
-        );
-        install.arg(&requirements);
-        run("install the programs that write them", install)?;
-        fs::write(&stamp, &wanted)?;
-    }
+    let python = setup::python_environment("formats", &sources.join("requirements.txt"))?;
     let files = target().join("formats");
     if files.exists() {
         fs::remove_dir_all(&files)?;

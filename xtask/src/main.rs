@@ -11,6 +11,7 @@ mod fuzz;
 mod image;
 mod latency;
 mod mechanisms;
+mod python;
 mod release;
 mod setup;
 mod step;
@@ -91,6 +92,8 @@ enum Command {
         #[arg(long)]
         mutations: Option<u64>,
     },
+    /// Build the Python package as a wheel, install it, and hold it against the command.
+    Python,
     /// Write the field guide, docs/mechanisms.md with its pictures, from what the mechanisms say of themselves.
     Mechanisms,
     /// Compile the core to WebAssembly for the pages' what-if, into crates/muslip-report/what-if.
@@ -122,6 +125,7 @@ fn main() -> anyhow::Result<()> {
     match Arguments::parse().command {
         Command::Test => test::run_all(),
         Command::Check => check::run_all(),
+        Command::Python => python::test(),
         Command::Formats { mutations } => formats::test(mutations),
         Command::Firmware => firmware::budgets(),
         Command::Pil {

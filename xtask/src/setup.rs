@@ -1,7 +1,8 @@
 //! What the tests need beyond a Rust toolchain: rustup targets and system packages.
 
 use std::ffi::OsString;
-use std::path::PathBuf;
+use std::fs;
+use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use anyhow::{Context, Result, bail};
@@ -56,16 +57,42 @@ const CYCLES_TOOLS: &[Tool] = &[
     },
 ];
 
-/// Programs that write the files of other formats.
-const FORMATS_TOOLS: &[Tool] = &[Tool {
+/// What Python environments are made with.
+const PYTHON_TOOLS: &[Tool] = &[Tool {
     program: "python3",
     package: "python3-venv",
-    needed_for: "the files that the readers are held against",
+    needed_for: "the files that the readers are held against, and the Python package",
 }];
 
-/// As [`run_all`], for `cargo xtask formats`.
-pub fn for_formats() -> Result<()> {
-    Machine::this().tools(FORMATS_TOOLS)
+/// The interpreter of a virtual environment below the target folder that has these requirements; made once, and again
+/// where they change.
+pub fn python_environment(name: &str, requirements: &Path) -> Result<PathBuf> {
+    Machine::this().tools(PYTHON_TOOLS)?;
+    let wanted =
+        fs::read_to_string(requirements).with_context(|| requirements.display().to_string())?;
+    let environment = target().join("tools").join(name);
+    let stamp = environment.join("installed.txt");
+    let python = environment.join("bin").join("python");
+    if fs::read_to_string(&stamp).ok().as_ref() != Some(&wanted) {
+        let mut make = command("python3", &["-m", "venv", "--clear"]);
+        make.arg(&environment);
+        set_up_step(&format!("make the Python environment {name}"), make)?;
+        let mut install = command(
+            &python.to_string_lossy(),
+            &[
+                "-m",
+                "pip",
+                "install",
+                "--quiet",
+                "--disable-pip-version-check",
+                "-r",
+            ],
+        );
+        install.arg(requirements);
+        set_up_step(&format!("install what {name} needs"), install)?;
+        fs::write(&stamp, &wanted)?;
+    }
+    Ok(python)
 }
 
 /// As [`run_all`], for `cargo xtask cycles`.

@@ -8,6 +8,7 @@ use anyhow::{Context, Result, bail};
 use crate::cycles;
 use crate::firmware;
 use crate::formats;
+use crate::python;
 use crate::setup::{self, TARGETS};
 use crate::step::{CHECKED, cargo, run, step};
 use crate::trial;
@@ -77,6 +78,8 @@ pub fn run_all() -> Result<()> {
             "--no-fail-fast",
         ]),
     )?;
+
+    python::test()?;
 
     trial::small()?;
 
