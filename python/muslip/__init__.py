@@ -14,7 +14,7 @@ from __future__ import annotations
 import json
 import os
 import tempfile
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -105,7 +105,7 @@ class Rig:
     0.31
     """
 
-    _native: _native.Rig
+    _engine: _native.Rig
 
     def __init__(
         self,
@@ -122,7 +122,7 @@ class Rig:
         noise: Mapping[str, float] | None = None,
     ) -> None:
         whole: dict[str, dict[str, Any]] = {name: dict(table) for name, table in (tables or {}).items()}
-        given = {
+        given: dict[str, dict[str, Any]] = {
             "wheel": {"radius_m": radius_m, "inertia_kg_m2": inertia_kg_m2},
             "vehicle": {"mass_kg": mass_kg, "coasting": coasting},
             "brake": {"torque_per_pressure_nm_pa": torque_per_pressure_nm_pa},
@@ -134,7 +134,7 @@ class Rig:
             if said:
                 whole.setdefault(name, {}).update(said)
         if set(whole) == {"wheel"} and set(whole["wheel"]) == {"radius_m"}:
-            self._native = _native.Rig.of_radius(whole["wheel"]["radius_m"])
+            self._engine = _native.Rig.of_radius(whole["wheel"]["radius_m"])
             return
         if "vehicle" in whole:
             whole["vehicle"].setdefault("coasting", True)
@@ -145,11 +145,9 @@ class Rig:
                 if (key in numbers or name == "noise") and not isinstance(value, bool):
                     number = float(value)
                     if not np.isfinite(number):
-                        raise MuslipError(
-                            f"rig:1:1: {name}.{key} = {number}: must be finite and positive", "rig", 1, 1
-                        )
+                        raise MuslipError(f"rig:1:1: {name}.{key} = {number}: must be finite and positive", "rig", 1, 1)
                     table[key] = number
-        self._native = _native.Rig.of_json(json.dumps(whole))
+        self._engine = _native.Rig.of_json(json.dumps(whole))
 
     @classmethod
     def from_toml(cls, path: Path) -> Rig:
@@ -159,7 +157,7 @@ class Rig:
     @classmethod
     def _of(cls, native: _native.Rig) -> Rig:
         rig = cls.__new__(cls)
-        rig._native = native
+        rig._engine = native
         return rig
 
     @property
@@ -170,19 +168,19 @@ class Rig:
     def to_toml(self, path: Path | None = None) -> str:
         """The text of the rig file, written to a path where one is given."""
         if path is not None:
-            _write(path, self._native.text)
-        return self._native.text
+            _write(path, self._engine.text)
+        return self._engine.text
 
     def to_dict(self) -> dict[str, Any]:
         """The tables of the rig file."""
-        tables: dict[str, Any] = json.loads(self._native.json())
+        tables: dict[str, Any] = json.loads(self._engine.json())
         return tables
 
     def __repr__(self) -> str:
         return f"Rig({self.to_dict()!r})"
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return (_rig_again, (self._native.text, self._native.path, self._native.whole))
+        return (_rig_again, (self._engine.text, self._engine.path, self._engine.whole))
 
 
 def _rig_again(text: str, path: str, whole: bool) -> Rig:
@@ -196,9 +194,9 @@ RigLike = Rig | Path | Mapping[str, Any]
 
 def _rig(rig: RigLike) -> _native.Rig:
     if isinstance(rig, Rig):
-        return rig._native
+        return rig._engine
     if isinstance(rig, Mapping):
-        return Rig(rig)._native
+        return Rig(rig)._engine
     return _native.Rig.read(rig)
 
 
@@ -228,12 +226,12 @@ class Recording:
     5
     """
 
-    _native: _native.Columns
+    _engine: _native.Columns
 
     def __init__(self, data: Any, *, map: Map = None, name: str = "recording") -> None:
         columns = _columns_of(data)
         if map is not None or not any(column in _CONTRACT for column in columns):
-            self._native = _mapped(columns, map, name)
+            self._engine = _mapped(columns, map, name)
             return
         names, arrays = [], []
         for index, (column, values) in enumerate(columns.items()):
@@ -244,41 +242,38 @@ class Recording:
             elif column in _CONTRACT:
                 message = f"{name}:1:{index + 1}: {column}: not numbers"
                 raise MuslipError(message, name, 1, index + 1, str(column))
-        self._native = _native.Columns.of_arrays(name, names, arrays)
+        self._engine = _native.Columns.of_arrays(name, names, arrays)
 
     @classmethod
     def _of(cls, native: _native.Columns) -> Recording:
         recording = cls.__new__(cls)
-        recording._native = native
+        recording._engine = native
         return recording
 
     @property
     def name(self) -> str:
         """The file, or what stands for one."""
-        return self._native.name
+        return self._engine.name
 
     @property
     def columns(self) -> list[str]:
         """Names of the columns."""
-        return self._native.names
+        return self._engine.names
 
     @property
     def notes(self) -> list[str]:
         """What was done to read it from a file of another format."""
-        return self._native.notes
+        return self._engine.notes
 
     def __len__(self) -> int:
-        return self._native.rows
+        return self._engine.rows
 
     def __repr__(self) -> str:
         return f"<muslip.Recording {self.name!r}: {len(self)} rows of {', '.join(self.columns)}>"
 
     def to_dict(self) -> dict[str, np.ndarray[Any, np.dtype[np.float64]]]:
         """The columns as arrays."""
-        return {
-            name: np.frombuffer(self._native.column(index), dtype=np.float64)
-            for index, name in enumerate(self.columns)
-        }
+        return {name: np.frombuffer(self._engine.column(index), dtype=np.float64) for index, name in enumerate(self.columns)}
 
     def to_pandas(self) -> pandas.DataFrame:
         """The columns as a pandas frame."""
@@ -316,8 +311,10 @@ def _floats(values: Any) -> Any:
         kind = getattr(values.dtype, "kind", "O")
         if kind not in "fiub":
             return None
-        values = values.to_numpy() if kind == "f" and isinstance(values.dtype, np.dtype) else values.to_numpy(
-            dtype=np.float64, na_value=np.nan
+        values = (
+            values.to_numpy()
+            if kind == "f" and isinstance(values.dtype, np.dtype)
+            else values.to_numpy(dtype=np.float64, na_value=np.nan)
         )
     elif hasattr(values, "to_numpy"):  # polars
         values = values.to_numpy()
@@ -353,10 +350,10 @@ RecordingLike = Any
 
 def _source(data: RecordingLike, name: str = "recording") -> Any:
     if isinstance(data, Recording):
-        return data._native
+        return data._engine
     if isinstance(data, (str, os.PathLike)):
         return data
-    return Recording(data, name=name)._native
+    return Recording(data, name=name)._engine
 
 
 def _sources(data: RecordingLike) -> list[Any]:
@@ -485,9 +482,7 @@ def estimate(
     if model is not None and not isinstance(model, Model):
         model = Model.read(model)
     with _Bar(progress, "estimate") as told:
-        native = _native.estimate(
-            _source(recording), _rig(rig), _map(map), range, estimator, model, trace, told
-        )
+        native = _native.estimate(_source(recording), _rig(rig), _map(map), range, estimator, model, trace, told)
     return estimate_of(native)
 
 
@@ -576,11 +571,17 @@ def simulate(
         Of the sensors' noise.
     law : str, optional
         ``rudd:MUP,SP``, ``burckhardt:SURFACE``, ``burckhardt:C1,C2,C3`` or ``magic-formula:B,C,D,E``.
+    speed_m_s, normal_force_n : float, optional
+        Speed at the start and load; what the rig makes sensible where they are not given.
+    applications : int
+        Applications of the brake.
+    duration_s, rate_hz : float
+        Length and rate of the recording.
+    noise : bool
+        Whether the sensors have the rig's noise.
     """
     return Recording._of(
-        _native.simulate(
-            _rig(rig), law, seed, speed_m_s, normal_force_n, applications, duration_s, rate_hz, noise
-        )
+        _native.simulate(_rig(rig), law, seed, speed_m_s, normal_force_n, applications, duration_s, rate_hz, noise)
     )
 
 
@@ -601,22 +602,20 @@ class Estimator:
         range: Literal["aircraft", "automotive"] | None = None,
         estimator: Literal["article", "efficient"] | None = None,
     ) -> None:
-        self._native = _native.Estimator(range, estimator)
+        self._engine = _native.Estimator(range, estimator)
 
     def update(self, slip: float, friction: float, std: float) -> bool:
         """Correct the estimate with one measurement; whether it was taken."""
-        return self._native.update(slip, friction, std)
+        return self._engine.update(slip, friction, std)
 
     def update_many(self, slips: Any, frictions: Any, stds: Any) -> np.ndarray[Any, np.dtype[np.bool_]]:
         """Correct it with one measurement after the other; whether each was taken. One ``std`` may serve all."""
         slips = np.ascontiguousarray(slips, dtype=np.float64)
         stds = np.ascontiguousarray(np.broadcast_to(np.asarray(stds, dtype=np.float64), slips.shape))
         frictions = np.ascontiguousarray(frictions, dtype=np.float64)
-        return np.frombuffer(self._native.update_many(slips, frictions, stds), dtype=np.bool_)
+        return np.frombuffer(self._engine.update_many(slips, frictions, stds), dtype=np.bool_)
 
     @property
     def peak(self) -> Peak:
         """The peak of the curve as estimated now."""
-        return Peak(*self._native.peak())
-
-
+        return Peak(*self._engine.peak())

@@ -5,7 +5,6 @@ from typing import Any
 _Path = str | PathLike[str]
 _Map = tuple[bool, str] | None
 _Progress = Callable[[float, str], object] | None
-_Source = Columns | _Path
 
 __version__: str
 
@@ -25,6 +24,8 @@ class Columns:
     def notes(self) -> list[str]: ...
     def address(self, column: int) -> int | None: ...
     def column(self, column: int) -> bytes: ...
+
+_Source = Columns | _Path
 
 class Rig:
     @staticmethod
@@ -96,9 +97,7 @@ def diagnose(
     out: _Path | None = None,
     progress: _Progress = None,
 ) -> Diagnosed: ...
-def predict(
-    recording: _Source, rig: Rig, model: Model, map: _Map = None, base: bool = False
-) -> list[tuple[str, bytes]]: ...
+def predict(recording: _Source, rig: Rig, model: Model, map: _Map = None, base: bool = False) -> list[tuple[str, bytes]]: ...
 def simulate(
     rig: Rig,
     law: str | None = None,

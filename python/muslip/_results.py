@@ -170,7 +170,7 @@ class Estimate(_Result):
     correlation: float
     samples: Samples
     consistency: Consistency
-    _native: _native.Estimate | None = field(repr=False, compare=False, default=None)
+    _engine: _native.Estimate | None = field(repr=False, compare=False, default=None)
 
     @property
     def trace(self) -> Frame:
@@ -178,9 +178,9 @@ class Estimate(_Result):
         return _frame(self._kept().trace())
 
     def _kept(self) -> _native.Estimate:
-        if self._native is None:
+        if self._engine is None:
             raise MuslipError("error: an estimate that was pickled has no trace and no report")
-        return self._native
+        return self._engine
 
     def report(self, path: str | os.PathLike[str]) -> None:
         """Write the page of ``muslip estimate --report``."""
@@ -189,7 +189,7 @@ class Estimate(_Result):
     def plot(self, ax: Any = None) -> Any:
         """Draw the curve with its band by matplotlib; answers with the axes."""
         points = None
-        if self._native is not None:
+        if self._engine is not None:
             trace = self.trace
             points = (trace["slip"], trace["friction"])
         return _plot_curve(self, ax, points)
@@ -202,7 +202,7 @@ class Estimate(_Result):
         )
 
     def __getstate__(self) -> _Object:
-        return {**self.__dict__, "_native": None}
+        return {**self.__dict__, "_engine": None}
 
 
 def estimate_of(native: _native.Estimate) -> Estimate:
@@ -216,7 +216,7 @@ def estimate_of(native: _native.Estimate) -> Estimate:
         correlation=of["correlation"],
         samples=_made(Samples, of["samples"]),
         consistency=_made(Consistency, of["consistency"]),
-        _native=native,
+        _engine=native,
     )
 
 
@@ -362,12 +362,12 @@ class Diagnosis(_Result):
     unexplained: tuple[Unexplained, ...]
     data_faults: tuple[DataFault, ...]
     base: dict[str, Quantity]
-    _native: _native.Diagnosed | None = field(repr=False, compare=False, default=None)
+    _engine: _native.Diagnosed | None = field(repr=False, compare=False, default=None)
 
     def _kept(self) -> _native.Diagnosed:
-        if self._native is None:
+        if self._engine is None:
             raise MuslipError("error: a diagnosis that was pickled has no model and no report")
-        return self._native
+        return self._engine
 
     @property
     def model(self) -> _native.Model:
@@ -379,10 +379,7 @@ class Diagnosis(_Result):
         _write(path, self._kept().report_html())
 
     def _before_after(self) -> list[tuple[str, float, float]]:
-        return [
-            (which, of["before"]["rmse_n"], of["after"]["rmse_n"])
-            for which, of in self.to_dict()["fit"].items()
-        ]
+        return [(which, of["before"]["rmse_n"], of["after"]["rmse_n"]) for which, of in self.to_dict()["fit"].items()]
 
     def plot(self, ax: Any = None) -> Any:
         """Draw the error of the drag before and after the repair by matplotlib; answers with the axes."""
@@ -403,19 +400,16 @@ class Diagnosis(_Result):
         from html import escape
 
         rows = "".join(
-            f"<tr><td>{which}</td><td>{before:.4g}</td><td>{after:.4g}</td></tr>"
-            for which, before, after in self._before_after()
+            f"<tr><td>{which}</td><td>{before:.4g}</td><td>{after:.4g}</td></tr>" for which, before, after in self._before_after()
         )
-        names = "".join(
-            f"<li>{escape(m.statement)} (confidence {m.evidence.confidence:.2f})</li>" for m in self.mechanisms
-        )
+        names = "".join(f"<li>{escape(m.statement)} (confidence {m.evidence.confidence:.2f})</li>" for m in self.mechanisms)
         return (
             f"<p><b>{escape(self.verdict)}</b></p><ul>{names}</ul><table><tr><th>rms error of the drag (N)</th>"
             f"<th>before</th><th>after</th></tr>{rows}</table>"
         )
 
     def __getstate__(self) -> _Object:
-        return {**self.__dict__, "_native": None}
+        return {**self.__dict__, "_engine": None}
 
 
 def diagnosis_of(native: _native.Diagnosed) -> Diagnosis:
@@ -442,5 +436,5 @@ def diagnosis_of(native: _native.Diagnosed) -> Diagnosis:
         unexplained=_many(Unexplained, of["unexplained"]),
         data_faults=_many(DataFault, of["data_faults"]),
         base={name: _made(Quantity, one) for name, one in of["base"].items()},
-        _native=native,
+        _engine=native,
     )

@@ -13,12 +13,13 @@ import subprocess
 import threading
 import time
 
-import muslip
 import numpy as np
 import pandas
 import polars
 import pyarrow
 import pytest
+
+import muslip
 
 COMMAND = os.environ.get("MUSLIP_COMMAND")
 
@@ -136,7 +137,7 @@ def test_columns_are_read_where_they_lie(files):
         recording = muslip.Recording(data)
         if addresses is None:
             addresses = [column.to_numpy(allow_copy=False).ctypes.data for column in data.get_columns()]
-        assert [recording._native.address(index) for index in range(len(addresses))] == addresses, name
+        assert [recording._engine.address(index) for index in range(len(addresses))] == addresses, name
         assert muslip.estimate(data, rig).to_dict() == expected, name
 
 

@@ -15,6 +15,24 @@ const COMMAND: &str = "MUSLIP_COMMAND";
 pub fn test() -> Result<()> {
     let python = setup::python_environment("python", &root().join("python/requirements.txt"))?;
     let python = python.to_string_lossy();
+    for (name, arguments) in [
+        (
+            "Python: lint",
+            ["-m", "ruff", "check", "--quiet", "--no-cache"].as_slice(),
+        ),
+        (
+            "Python: format",
+            &["-m", "ruff", "format", "--quiet", "--check", "--no-cache"],
+        ),
+        ("Python: types", &["-m", "mypy", "--no-error-summary"]),
+    ] {
+        let mut check = command(&python, arguments);
+        check
+            .arg("muslip")
+            .current_dir(root().join("python"))
+            .env("MYPY_CACHE_DIR", target().join("mypy"));
+        run(name, check)?;
+    }
     run(
         "the command that the package is held against",
         cargo(&[
