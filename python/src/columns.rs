@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use muslip_recordings::load::Source;
-use muslip_recordings::recording::{Memory, SharedColumn};
+use muslip_recordings::recording::{Memory, Recording, SharedColumn};
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
 
@@ -120,7 +120,7 @@ impl Columns {
         let memory = job::run(py, None, move |_| {
             let map = map_of(map.as_ref())?;
             let name = name.unwrap_or_else(|| path.clone());
-            let read = Memory::read(&path, map.as_ref());
+            let read = Recording::read_whole(&path, map.as_ref());
             read.map(|memory| memory.named(&name)).map_err(|mut error| {
                 if error.path == path {
                     error.path = name;

@@ -17,7 +17,7 @@ use muslip_diagnose::repaired::Which;
 use muslip_recordings::load::{self, Source};
 use muslip_recordings::model_file;
 use muslip_recordings::output::write_file;
-use muslip_recordings::recording::{Channel, Memory, RecordingWriter, Required};
+use muslip_recordings::recording::{Channel, Recording, RecordingWriter, Required};
 use muslip_report::diagnose::views::Views;
 use muslip_report::diagnose::{files, page};
 use muslip_report::of_estimate;
@@ -409,7 +409,7 @@ pub(crate) fn simulate(
                 RunError::Scenario(error) => Failure::Other(error.to_string()),
             })?;
         write_file(&path, &writer.into_inner())?;
-        Ok(Memory::read(&path, None)?.named(Path::new("simulated")))
+        Ok(Recording::read_whole(&path, None)?.named(Path::new("simulated")))
     })?;
     Ok(Columns { memory })
 }

@@ -5,25 +5,23 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use muslip_formats::convert;
-use muslip_formats::map::Map;
 
 use super::header::{Channel, Header, Required};
-use super::reader::Recording;
 use crate::input_error::{InputError, InputProblem, quoted, shown};
 
 /// A column that may belong to somebody else, such as an array of another language. A missing value is `NaN`.
 pub type SharedColumn = Arc<dyn AsRef<[f64]> + Send + Sync>;
 
-/// A whole recording in memory: cheap to clone, and opened as often as wanted by [`Recording::of_memory`].
+/// A whole recording in memory: cheap to clone, and opened as often as wanted by [`super::Recording::of_memory`].
 #[derive(Clone)]
 pub struct Memory {
-    path: PathBuf,
-    header: Header,
-    columns: Vec<SharedColumn>,
-    rows: usize,
-    notes: Vec<String>,
-    faults: Vec<convert::Fault>,
-    refused: Vec<(&'static str, String)>,
+    pub(super) path: PathBuf,
+    pub(super) header: Header,
+    pub(super) columns: Vec<SharedColumn>,
+    pub(super) rows: usize,
+    pub(super) notes: Vec<String>,
+    pub(super) faults: Vec<convert::Fault>,
+    pub(super) refused: Vec<(&'static str, String)>,
 }
 
 impl fmt::Debug for Memory {
@@ -88,42 +86,6 @@ impl Memory {
         };
         memory.check_time()?;
         Ok(memory)
-    }
-
-    /// Reads a file of any format whole, by a map or without one.
-    ///
-    /// # Errors
-    /// [`InputError`] as for [`Recording::open_mapped`], [`Recording::rows`] and [`super::Rows::next_row`]; the drag may be missing.
-    pub fn read(path: &Path, map: Option<&Map>) -> Result<Self, InputError> {
-        let mut recording = Recording::open_mapped(path, map)?;
-        let (mut notes, mut faults, mut refused) = (Vec::new(), Vec::new(), Vec::new());
-        if let Some(converted) = recording.converted() {
-            notes.clone_from(&converted.notes);
-            faults.clone_from(&converted.faults);
-            refused.clone_from(&converted.refused);
-        }
-        let mut rows = recording.rows(Required::DragOptional)?;
-        let header = rows.header().clone();
-        let mut columns: Vec<Vec<f64>> = vec![Vec::new(); header.names().len()];
-        while let Some(row) = rows.next_row()? {
-            for (column, &value) in columns.iter_mut().zip(row.cells()) {
-                column.push(value);
-            }
-        }
-        let rows = columns.first().map_or(0, Vec::len);
-        let columns = columns
-            .into_iter()
-            .map(|column| Arc::new(column) as SharedColumn)
-            .collect();
-        Ok(Self {
-            path: path.to_owned(),
-            header,
-            columns,
-            rows,
-            notes,
-            faults,
-            refused,
-        })
     }
 
     /// The same under another name.
@@ -270,30 +232,5 @@ mod tests {
             "frame:2:2: drag_force_n: 1 values where the first column has 2"
         );
         assert_eq!(complaint(vec![]), "frame:1:1: no usable sample: no row");
-    }
-
-    #[test]
-    fn rows_in_memory_are_those_of_the_file() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("run.csv");
-        std::fs::write(
-            &path,
-            "time_s,wheel_speed_rad_s,vehicle_speed_m_s,drag_force_n,normal_force_n,x\n0,1,2,3,4,5\n0.1,,2,3,4,6\n",
-        )
-        .unwrap();
-        let memory = Memory::read(&path, None).unwrap();
-        assert_eq!(memory.rows(), 2);
-        let rows = |recording: &mut Recording| {
-            let mut rows = recording.rows(Required::DragIncluded).unwrap();
-            let mut found = Vec::new();
-            while let Some(row) = rows.next_row().unwrap() {
-                found.push(row.cells().iter().map(|v| v.to_bits()).collect::<Vec<_>>());
-            }
-            found
-        };
-        assert_eq!(
-            rows(&mut Recording::of_memory(memory)),
-            rows(&mut Recording::open(&path).unwrap())
-        );
     }
 }

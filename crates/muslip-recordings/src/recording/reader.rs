@@ -3,13 +3,14 @@
 use std::fs::File;
 use std::io::{self, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use csv::ByteRecord;
 use muslip::sample::RigSample;
 use muslip_formats::map::Map;
 
 use super::header::{Channel, Header, Required};
-use super::memory::Memory;
+use super::memory::{Memory, SharedColumn};
 use super::position::{Place, line_and_column};
 use super::table::Table;
 use super::utf8::{NotUtf8At, Utf8Reader};
@@ -96,6 +97,42 @@ impl Recording {
             length_bytes: memory.length_bytes(),
             source: Source::Memory(memory),
         }
+    }
+
+    /// Reads a file of any format whole into memory, by a map or without one.
+    ///
+    /// # Errors
+    /// [`InputError`] as for [`Recording::open_mapped`], [`Recording::rows`] and [`Rows::next_row`]; the drag may be missing.
+    pub fn read_whole(path: &Path, map: Option<&Map>) -> Result<Memory, InputError> {
+        let mut recording = Self::open_mapped(path, map)?;
+        let (mut notes, mut faults, mut refused) = (Vec::new(), Vec::new(), Vec::new());
+        if let Some(converted) = recording.converted() {
+            notes.clone_from(&converted.notes);
+            faults.clone_from(&converted.faults);
+            refused.clone_from(&converted.refused);
+        }
+        let mut rows = recording.rows(Required::DragOptional)?;
+        let header = rows.header().clone();
+        let mut columns: Vec<Vec<f64>> = vec![Vec::new(); header.names().len()];
+        while let Some(row) = rows.next_row()? {
+            for (column, &value) in columns.iter_mut().zip(row.cells()) {
+                column.push(value);
+            }
+        }
+        let rows = columns.first().map_or(0, Vec::len);
+        let columns = columns
+            .into_iter()
+            .map(|column| Arc::new(column) as SharedColumn)
+            .collect();
+        Ok(Memory {
+            path: path.to_owned(),
+            header,
+            columns,
+            rows,
+            notes,
+            faults,
+            refused,
+        })
     }
 
     /// What was read, converted, interpolated, decimated or dropped to get the columns from a file of another format; empty for a CSV of the
@@ -459,5 +496,35 @@ impl Row<'_> {
     /// The four channels of which slip and friction are made.
     pub fn rig_sample(&self) -> RigSample<f64> {
         self.header.rig_sample(self.cells)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rows_in_memory_are_those_of_the_file() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("run.csv");
+        std::fs::write(
+            &path,
+            "time_s,wheel_speed_rad_s,vehicle_speed_m_s,drag_force_n,normal_force_n,x\n0,1,2,3,4,5\n0.1,,2,3,4,6\n",
+        )
+        .unwrap();
+        let memory = Recording::read_whole(&path, None).unwrap();
+        assert_eq!(memory.rows(), 2);
+        let rows = |recording: &mut Recording| {
+            let mut rows = recording.rows(Required::DragIncluded).unwrap();
+            let mut found = Vec::new();
+            while let Some(row) = rows.next_row().unwrap() {
+                found.push(row.cells().iter().map(|v| v.to_bits()).collect::<Vec<_>>());
+            }
+            found
+        };
+        assert_eq!(
+            rows(&mut Recording::of_memory(memory)),
+            rows(&mut Recording::open(&path).unwrap())
+        );
     }
 }
