@@ -1,8 +1,11 @@
 //! How a dependence that no mechanism accounts for acts on the drag: by hat functions of its variable, on the friction,
 //! the force or the slip at the peak.
 
+use rayon::prelude::*;
+
 use crate::data::Data;
 use crate::model::{Model, tyre};
+use crate::series::Series;
 
 /// How columns of a variable act.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -96,27 +99,20 @@ impl Levers {
     #[must_use]
     pub fn new(data: &Data, model: &Model) -> Self {
         let p = model.vector();
-        let mut levers = Self {
-            force: Vec::new(),
-            critical: Vec::new(),
-        };
-        for series in &data.series {
+        let of_run = |series: &Series| {
             let state = tyre(&data.catalogue, model, &p, series, &data.context);
             let critical = state.law.critical;
-            levers.critical.push(
-                (0..series.len())
-                    .map(|k| {
-                        let x = state.slip[k] / critical;
-                        let h = 1e-4;
-                        let slope =
-                            (state.law.friction(x + h) - state.law.friction(x - h)) / (2.0 * h);
-                        -slope * x * state.load[k]
-                    })
-                    .collect(),
-            );
-            levers.force.push(state.contact.unwrap_or(state.force));
-        }
-        levers
+            let slope = |k: usize| {
+                let x = state.slip[k] / critical;
+                let h = 1e-4;
+                let slope = (state.law.friction(x + h) - state.law.friction(x - h)) / (2.0 * h);
+                -slope * x * state.load[k]
+            };
+            let critical: Vec<f64> = (0..state.slip.len()).map(slope).collect();
+            (state.contact.unwrap_or(state.force), critical)
+        };
+        let (force, critical) = data.series.par_iter().map(of_run).unzip();
+        Self { force, critical }
     }
 
     /// The lever of an action.

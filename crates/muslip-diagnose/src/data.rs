@@ -14,20 +14,25 @@ use crate::prepare::{MOST_REACH, prepare};
 use crate::series::{DataFault, LawProducts, Series};
 use crate::smooth::median_in_place;
 
-/// Width of the dual numbers: parameters differentiated in one pass.
+/// Greatest width of the dual numbers: most parameters differentiated in one pass.
 pub const WIDTH: usize = 8;
 
 /// The catalogue in plain and in dual numbers, in the same order.
 pub struct Catalogue {
     plain: Vec<Box<dyn Mechanism<f64>>>,
-    dual: Vec<Box<dyn Mechanism<Dual<WIDTH>>>>,
+    /// In numbers with so many derivatives: what is wider than need be costs as much more.
+    two: Vec<Box<dyn Mechanism<Dual<2>>>>,
+    four: Vec<Box<dyn Mechanism<Dual<4>>>>,
+    all: Vec<Box<dyn Mechanism<Dual<WIDTH>>>>,
 }
 
 impl Default for Catalogue {
     fn default() -> Self {
         Self {
             plain: catalogue(),
-            dual: catalogue(),
+            two: catalogue(),
+            four: catalogue(),
+            all: catalogue(),
         }
     }
 }
@@ -69,9 +74,21 @@ impl Listed for f64 {
     }
 }
 
+impl Listed for Dual<2> {
+    fn entry(catalogue: &Catalogue, index: usize) -> &dyn Mechanism<Self> {
+        catalogue.two[index].as_ref()
+    }
+}
+
+impl Listed for Dual<4> {
+    fn entry(catalogue: &Catalogue, index: usize) -> &dyn Mechanism<Self> {
+        catalogue.four[index].as_ref()
+    }
+}
+
 impl Listed for Dual<WIDTH> {
     fn entry(catalogue: &Catalogue, index: usize) -> &dyn Mechanism<Self> {
-        catalogue.dual[index].as_ref()
+        catalogue.all[index].as_ref()
     }
 }
 

@@ -1,9 +1,11 @@
 //! The base law's two parameters by plain least squares: on the channels as recorded, beside named terms, or next to
 //! another model.
 
+use rayon::prelude::*;
+
 use crate::data::Data;
-use crate::innovations::candidates::slopes_in;
-use crate::innovations::rows::rows_of;
+use crate::innovations::derivatives::tyre_slopes_in;
+use crate::innovations::rows::tyre_row_of;
 use crate::model::Model;
 use crate::series::{LawProducts, Series};
 
@@ -18,15 +20,11 @@ const SMALL: f64 = 1e-5;
 
 /// The model with the law's parameters at which its readings come closest to these, one vector a run.
 pub(crate) fn closest(data: &Data, start: &Model, readings: &[Vec<f64>]) -> Model {
-    let left = |model: &Model, run: usize| left_of(data, model, run, &readings[run]);
-    let square = |model: &Model| -> f64 {
-        let runs = data.series.iter().enumerate();
-        runs.map(|(run, s)| s.tyre_square(&left(model, run))).sum()
-    };
+    let square = |model: &Model| -> f64 { squares(data, model, readings).iter().sum() };
     let mut model = start.clone();
     let mut least = square(&model);
     for _ in 0..STEPS {
-        let Some(step) = step(data, &model, &left) else {
+        let Some(step) = step(data, &model, readings) else {
             break;
         };
         let mut share = 1.0;
@@ -50,25 +48,35 @@ pub(crate) fn closest(data: &Data, start: &Model, readings: &[Vec<f64>]) -> Mode
     model
 }
 
+/// Sum of squares of what a model leaves of these readings of the drag, by run.
+pub(crate) fn squares(data: &Data, model: &Model, readings: &[Vec<f64>]) -> Vec<f64> {
+    let runs = data.series.par_iter().enumerate();
+    runs.map(|(run, s)| s.tyre_square(&left_of(data, model, run, &readings[run])))
+        .collect()
+}
+
 /// What a model leaves of these readings of the drag on one run, in N; empty where it is not recorded.
-pub(crate) fn left_of(data: &Data, model: &Model, run: usize, readings: &[f64]) -> Vec<f64> {
-    let rows = rows_of(data, model, run).tyre;
+fn left_of(data: &Data, model: &Model, run: usize, readings: &[f64]) -> Vec<f64> {
+    let rows = tyre_row_of(data, model, run);
     let drag = &data.series[run].drag;
     let shifted = rows.iter().zip(drag).zip(readings);
     shifted.map(|((e, own), y)| e - own + y).collect()
 }
 
 /// The Gauss-Newton step of the law's two parameters; `None` where the samples do not tell them apart.
-fn step(data: &Data, model: &Model, left: &dyn Fn(&Model, usize) -> Vec<f64>) -> Option<[f64; 2]> {
+fn step(data: &Data, model: &Model, readings: &[Vec<f64>]) -> Option<[f64; 2]> {
+    let left_and_slopes = |run: usize| {
+        let left = left_of(data, model, run, &readings[run]);
+        let slopes = (!left.is_empty()).then(|| tyre_slopes_in(data, model, run, &[0, 1]));
+        (left, slopes.unwrap_or_default())
+    };
+    let runs = 0..data.series.len();
+    let by_run: Vec<_> = runs.into_par_iter().map(left_and_slopes).collect();
     let (mut a, mut b, mut c, mut u, mut v) = (0.0, 0.0, 0.0, 0.0, 0.0);
-    for (run, s) in data.series.iter().enumerate() {
-        let e = left(model, run);
-        if e.is_empty() {
-            continue;
-        }
-        let slopes = slopes_in(data, model, run, &[0, 1]);
+    for (s, (e, slopes)) in data.series.iter().zip(&by_run) {
+        let [x, y] = slopes.as_slice() else { continue };
         for k in s.tyre.iter().flat_map(Clone::clone) {
-            let (x, y) = (slopes[0][0][k], slopes[1][0][k]);
+            let (x, y) = (x[k], y[k]);
             if (x + y + e[k]).is_finite() {
                 a += x * x;
                 b += x * y;

@@ -1,5 +1,7 @@
 //! The tyre's law as a clock: the drag follows the slip, so the delay of the speeds shows wherever slip moves.
 
+use rayon::prelude::*;
+
 use super::constants::{
     FEWEST_BLOCKS, HELD_WIDTH_S, LEAST_FILTER_S, MOMENT_S2, MOST_ROWS, SPEED_WIDTH_S, TOLD_SIGMAS,
     WHEEL_RANGE_S, WHEEL_STEP_S,
@@ -125,7 +127,7 @@ impl Law<'_> {
 impl Balance for Law<'_> {
     fn residual(&self, x: &[f64]) -> Vec<Vec<f64>> {
         self.blocks
-            .iter()
+            .par_iter()
             .map(|block| {
                 let width = if self.smooth { INSTRUMENT_S } else { self.step };
                 let (law, drag) = self.series(block, x, width);
@@ -143,7 +145,7 @@ impl Balance for Law<'_> {
         }
         Some(
             self.blocks
-                .iter()
+                .par_iter()
                 .map(|block| {
                     let (law, _) = self.series(block, x, INSTRUMENT_S.max(self.step));
                     law.iter().map(|l| -l / self.scale).collect()
@@ -154,7 +156,7 @@ impl Balance for Law<'_> {
 
     fn own(&self, x: &[f64]) -> Vec<Vec<Vec<f64>>> {
         self.blocks
-            .iter()
+            .par_iter()
             .map(|block| {
                 let mut columns = powers(block.count, 2);
                 columns.push(self.series(block, x, INSTRUMENT_S).0);
@@ -284,7 +286,7 @@ pub fn law(rig: &Rig, runs: &[Recording], vehicle: Timing, moment: f64) -> Optio
         lag: Lag::None,
         smooth: true,
         speeds: runs
-            .iter()
+            .par_iter()
             .map(|run| speed(rig, run, vehicle, moment))
             .collect(),
     };

@@ -38,6 +38,8 @@ pub mod wheel;
 
 pub use finding::{Finding, Timing, Word};
 
+use rayon::prelude::*;
+
 use crate::campaign::{Rig, Run};
 use colour::Colour;
 use recording::{Recording, recording};
@@ -139,7 +141,7 @@ fn of_tyre(
 /// Audits the measuring chain of a campaign.
 #[must_use]
 pub fn audit(rig: &Rig, runs: &[Run]) -> Audit {
-    let recordings: Vec<Recording> = runs.iter().map(|run| recording(rig, run)).collect();
+    let recordings: Vec<Recording> = runs.par_iter().map(|run| recording(rig, run)).collect();
     let timings = timings(rig, &recordings);
     let brake = recordings
         .iter()

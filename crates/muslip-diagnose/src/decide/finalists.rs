@@ -11,9 +11,9 @@ use crate::data::Data;
 use crate::innovations::candidates::{Candidate, Table, table};
 use crate::innovations::dependence::Dependence;
 use crate::innovations::gram::total;
-use crate::innovations::hypothesis::{Effort, judge_added, noise_stride, table_grams};
-use crate::innovations::noise::{BalanceParts, Slopes};
-use crate::innovations::rows::rows_of;
+use crate::innovations::hypothesis::{Effort, Noise, judge_added, noise_stride, table_grams};
+use crate::innovations::noise::Slopes;
+use crate::innovations::rows::tyre_row_of;
 use crate::innovations::screen::{Score, scores};
 use crate::looked::{self, POWER, Seen};
 use crate::mechanism::{Id, Residuals};
@@ -25,22 +25,22 @@ const FINALISTS: [usize; 2] = [3, 4];
 
 fn evidence(data: &Data, model: &Model) -> Vec<Residuals> {
     data.series
-        .iter()
+        .par_iter()
         .enumerate()
         .map(|(run, s)| {
-            let r = rows_of(data, model, run);
+            let left = tyre_row_of(data, model, run);
             let mut weight = vec![0.0; s.len()];
             for k in s.tyre.iter().flat_map(Clone::clone) {
                 weight[k] = s.drag_sigma.powi(-2).min(1e12);
             }
-            let none = r.tyre.is_empty();
+            let none = left.is_empty();
             Residuals {
                 predicted: if none {
                     vec![0.0; s.len()]
                 } else {
-                    s.drag.iter().zip(&r.tyre).map(|(a, b)| a - b).collect()
+                    s.drag.iter().zip(&left).map(|(a, b)| a - b).collect()
                 },
-                residual: if none { vec![0.0; s.len()] } else { r.tyre },
+                residual: if none { vec![0.0; s.len()] } else { left },
                 weight,
             }
         })
@@ -204,9 +204,9 @@ impl<'a> Screen<'a> {
             // What belongs to a balance that cannot be formed is not named for another.
             &|id| !taken(id) && data.forms(id.balance()),
         );
-        let at = |parts: &[BalanceParts]| scores(&table, &total(&table_grams(data, parts, &table)));
+        let at = |noise: &Noise| scores(&table, &total(&table_grams(data, noise, &table)));
         let levels: Vec<(Vec<Score>, usize)> =
-            match (at(before.noise_of_sensors()), at(&so_far.parts)) {
+            match (at(&before.beside().at_sensors), at(&before.beside().fitted)) {
                 (Some(sensors), Some(fitted)) => {
                     let both = at_both(&sensors, &fitted);
                     vec![(sensors, FINALISTS[0]), (both, FINALISTS[1])]
@@ -302,7 +302,7 @@ impl<'a> Screen<'a> {
                         Claim::Dependence(free)
                     }
                 };
-                let judged = judge_added(data, &model, &extra, so_far, effort(data))?;
+                let judged = judge_added(data, &model, &extra, self.before.beside(), effort(data))?;
                 Some(self.before.tried(claim, judged, self.size(*index)))
             })
             .collect();

@@ -10,9 +10,8 @@ use crate::constants::{
 };
 use crate::data::Data;
 use crate::innovations::dependence::Dependence;
-use crate::innovations::hypothesis::{Judged, Unseen, capped};
-use crate::innovations::noise::BalanceParts;
-use crate::law::{closest, left_of};
+use crate::innovations::hypothesis::{Beside, Judged, Unseen};
+use crate::law::{closest, squares};
 use crate::mechanism::{Balance, Id, Kind};
 use crate::number::mean_and_std;
 
@@ -170,27 +169,29 @@ pub struct Before<'a> {
     taken_up: f64,
     /// Sum of squares of the drag that its best law leaves, by run.
     squares: Vec<f64>,
-    /// The noise no larger than the sensors make plausible, and what it says of unseen runs under that.
-    at_sensors: (Vec<BalanceParts>, Option<Unseen>),
+    /// Its loss and its noise.
+    beside: Beside,
+    /// What it says of unseen runs where the noise is no larger than the sensors make plausible.
+    unseen_at_sensors: Option<Unseen>,
 }
 
 impl<'a> Before<'a> {
     pub fn new(data: &'a Data, judged: &'a Judged, untold: Untold, taken_up: f64) -> Self {
-        let noise = capped(&judged.parts);
-        let unseen = judged.unseen_under(data, &noise);
+        let beside = Beside::new(data, judged);
         Self {
             data,
             judged,
             untold,
             taken_up,
             squares: squares_by_best_law(data, judged),
-            at_sensors: (noise, unseen),
+            unseen_at_sensors: judged.unseen_under(data, &beside.at_sensors),
+            beside,
         }
     }
 
-    /// The noise no larger than the sensors make plausible.
-    pub fn noise_of_sensors(&self) -> &[BalanceParts] {
-        &self.at_sensors.0
+    /// Its loss and its noise.
+    pub fn beside(&self) -> &Beside {
+        &self.beside
     }
 
     pub fn tried(&self, claim: Claim, judged: Judged, size: f64) -> Trial {
@@ -247,13 +248,13 @@ impl<'a> Before<'a> {
             readings,
             size,
             unanimous: [&own_gains, &gains_at_sensors].map(|gains| unanimous(gains)),
-            judged,
+            judged: judged.without_columns(),
         }
     }
 
     fn gains_at_sensors(&self, with: &Judged, per_run: bool) -> Vec<f64> {
-        let (noise, before) = &self.at_sensors;
-        match (before, with.unseen_under(self.data, noise)) {
+        let with = with.unseen_under(self.data, &self.beside.at_sensors);
+        match (&self.unseen_at_sensors, with) {
             (Some(before), Some(with)) => gains(before, &with, per_run),
             _ => Vec::new(),
         }
@@ -278,10 +279,7 @@ impl<'a> Before<'a> {
 /// nuisances: those may stand for an effect.
 fn squares_by_best_law(data: &Data, judged: &Judged) -> Vec<f64> {
     let drags = judged.drag_to_explain(data);
-    let best = closest(data, &judged.model, &drags);
-    let runs = data.series.iter().enumerate();
-    runs.map(|(run, s)| s.tyre_square(&left_of(data, &best, run, &drags[run])))
-        .collect()
+    squares(data, &closest(data, &judged.model, &drags), &drags)
 }
 
 /// Shortest memory in s that is named: a filtered reading of the brake holds less noise than the reading itself, which

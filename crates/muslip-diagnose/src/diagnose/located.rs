@@ -2,7 +2,7 @@
 
 use super::answer::Answer;
 use crate::correction::Levers;
-use crate::innovations::rows::rows_of;
+use crate::innovations::rows::{rows_of, tyre_row_of};
 use crate::law::closest;
 use crate::locate::{intervals, regions};
 use crate::mechanism::{Balance, Id};
@@ -83,7 +83,7 @@ impl Answer<'_> {
         let data = &self.data;
         let expected = |model: &Model, run: usize| -> Vec<f64> {
             let drag = data.series[run].drag.iter();
-            let rows = rows_of(data, model, run).tyre;
+            let rows = tyre_row_of(data, model, run);
             drag.zip(rows).map(|(y, e)| y - e).collect()
         };
         let mut readings: Vec<Vec<f64>> = (0..data.series.len())

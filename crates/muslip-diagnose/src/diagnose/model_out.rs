@@ -1,6 +1,7 @@
 //! The repaired model as plain data, and whether it is the one that predicts.
 
 use nalgebra::DMatrix;
+use rayon::prelude::*;
 
 use super::answer::Answer;
 use crate::campaign::Run;
@@ -143,7 +144,8 @@ impl Answer<'_> {
     /// known, and as one that was never seen, whose own values are read off it anew and whose place is not known.
     pub(super) fn predicts(&self, base: &Repaired, with: &Repaired) -> Predicts {
         let better = |unseen: bool| {
-            let gains = self.given.runs.iter().enumerate().map(|(place, run)| {
+            let runs = self.given.runs.par_iter().enumerate();
+            let gains = runs.map(|(place, run)| {
                 let mut run = run.clone();
                 if unseen {
                     run.name = format!("unseen {place}");

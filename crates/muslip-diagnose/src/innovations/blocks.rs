@@ -60,17 +60,21 @@ impl Blocks {
         if column.is_empty() {
             return Vec::new();
         }
-        self.samples
-            .iter()
-            .map(|samples| {
-                let (mut sum, mut count) = (0.0, 0.0);
-                for x in column[samples.clone()].iter().filter(|x| x.is_finite()) {
-                    sum += x;
-                    count += 1.0;
-                }
-                sum / f64::max(count, 1.0)
-            })
-            .collect()
+        self.mean_of(|k| column[k])
+    }
+
+    /// Means of what stands at each sample.
+    #[must_use]
+    pub fn mean_of(&self, at: impl Fn(usize) -> f64) -> Vec<f64> {
+        let mean = |samples: &Range<usize>| {
+            let (mut sum, mut count) = (0.0, 0.0);
+            for x in samples.clone().map(&at).filter(|x| x.is_finite()) {
+                sum += x;
+                count += 1.0;
+            }
+            sum / f64::max(count, 1.0)
+        };
+        self.samples.iter().map(mean).collect()
     }
 }
 

@@ -3,15 +3,15 @@
 use rayon::prelude::*;
 
 use super::dependence::{Dependence, width};
+use super::derivatives::slopes_in;
 use super::gram::Columns;
 use super::noise::Slopes;
 use super::nuisances::nuisances;
-use super::rows::{Rows, Triple, rows, rows_of};
+use super::rows::{Rows, Triple, moved_rows, rows_of};
 use crate::correction::Levers;
-use crate::data::{Data, WIDTH};
+use crate::data::Data;
 use crate::mechanism::{Id, Residuals, Search};
 use crate::model::{Model, Term};
-use crate::number::{Dual, Number};
 
 /// A mechanism at one place of its nonlinear parameters, or a free dependence.
 #[derive(Clone, Debug)]
@@ -28,9 +28,16 @@ pub struct Candidate {
     pub columns: core::ops::Range<usize>,
 }
 
-/// Columns of one run that every model has: residual, base and terms; nuisances.
-type Fixed = (Vec<Triple>, Vec<(f64, Triple)>);
-/// A mechanism's own columns: the parameters that they belong to, and the columns by run.
+/// Columns of one run that every model has, as means over blocks.
+struct OfRun {
+    /// Residual, base, terms and free dependences.
+    columns: Vec<Triple>,
+    nuisances: Vec<(f64, Triple)>,
+    /// The residual sample by sample, where candidates are asked for.
+    here: Option<Triple>,
+}
+
+/// A mechanism's own columns as means over blocks: the parameters that they belong to, and the columns by run.
 type Own = (Vec<usize>, Vec<Vec<Triple>>);
 
 /// Everything that enters, by run: `[balance][run][column]`; the residual first, then base, nuisances, candidates.
@@ -51,39 +58,13 @@ fn values(rows: Rows<f64>) -> Triple {
     [rows.tyre, rows.wheel, rows.vehicle]
 }
 
-fn plain(data: &Data, model: &Model, run: usize) -> Triple {
-    values(rows_of(data, model, run))
+/// Means over the blocks of one run.
+fn means(data: &Data, run: usize, triple: &Triple) -> Triple {
+    core::array::from_fn(|b| data.blocks[run][b].mean(&triple[b]))
 }
 
-/// Derivatives of the rows in the parameters `which` of the model's vector.
-#[must_use]
-pub fn slopes_in(data: &Data, model: &Model, run: usize, which: &[usize]) -> Vec<Triple> {
-    let p = model.vector();
-    let mut out = Vec::new();
-    for chunk in which.chunks(WIDTH) {
-        let dual: Vec<Dual<WIDTH>> = p
-            .iter()
-            .enumerate()
-            .map(|(i, v)| {
-                chunk
-                    .iter()
-                    .position(|c| *c == i)
-                    .map_or(Dual::constant(*v), |at| Dual::variable(*v, at))
-            })
-            .collect();
-        let all = rows(
-            &data.catalogue,
-            model,
-            &dual,
-            &data.series[run],
-            &data.context,
-        );
-        for at in 0..chunk.len() {
-            let take = |x: &[Dual<WIDTH>]| x.iter().map(|d| d.slope[at]).collect();
-            out.push([take(&all.tyre), take(&all.wheel), take(&all.vehicle)]);
-        }
-    }
-    out
+fn plain(data: &Data, model: &Model, run: usize) -> Triple {
+    values(rows_of(data, model, run))
 }
 
 /// All columns of a campaign about a model.
@@ -107,7 +88,8 @@ pub fn table(
         let levers = levers.as_ref();
         levers.map_or(Vec::new(), |levers| dependence.columns(data, levers, run))
     };
-    let per_run: Vec<Fixed> = (0..runs)
+    let starts = starts(data, model, evidence, wanted);
+    let per_run: Vec<OfRun> = (0..runs)
         .into_par_iter()
         .map(|run| {
             let mut all = vec![plain(data, model, run)];
@@ -115,48 +97,71 @@ pub fn table(
             for dependence in extra {
                 all.extend(columns_of(dependence, run));
             }
-            (all, nuisances(data, slopes, run))
+            OfRun {
+                columns: all.iter().map(|own| means(data, run, own)).collect(),
+                nuisances: nuisances(data, slopes, run),
+                // What candidates change.
+                here: (!starts.is_empty()).then(|| all.swap_remove(0)),
+            }
         })
         .collect();
-    let here: Vec<Triple> = per_run.iter().map(|(all, _)| all[0].clone()).collect();
+    let mut here: Vec<Triple> = Vec::new();
     let mut table = Table {
         columns: core::array::from_fn(|_| vec![Vec::new(); runs]),
         base: fixed.len() + width(extra),
         free: width(extra),
-        nuisances: per_run
-            .first()
-            .map_or(Vec::new(), |(_, own)| own.iter().map(|n| n.0).collect()),
+        nuisances: per_run.first().map_or(Vec::new(), |own| {
+            own.nuisances.iter().map(|n| n.0).collect()
+        }),
         candidates: Vec::new(),
     };
-    for (run, (fixed, nuisance)) in per_run.into_iter().enumerate() {
-        let nuisance = nuisance.into_iter().map(|(_, triple)| triple);
-        table.enter(data, run, fixed.into_iter().chain(nuisance));
+    for (run, own) in per_run.into_iter().enumerate() {
+        let nuisances = own.nuisances.into_iter().map(|(_, triple)| triple);
+        table.enter(run, own.columns.into_iter().chain(nuisances));
+        here.extend(own.here);
     }
-    let starts = starts(data, model, evidence, wanted);
-    let made: Vec<Option<Own>> = starts
+    table.offer_mechanisms(data, model, starts, &here);
+    let of_run = |dependence: &Dependence, run: usize| -> Vec<Triple> {
+        let columns = columns_of(dependence, run);
+        columns.iter().map(|own| means(data, run, own)).collect()
+    };
+    let made: Vec<Vec<Vec<Triple>>> = free
         .par_iter()
-        .map(|(entry, start)| column_of(data, model, *entry, start, &here))
+        .map(|dependence| (0..runs).map(|run| of_run(dependence, run)).collect())
         .collect();
-    for ((entry, start), made) in starts.into_iter().zip(made) {
-        if let Some((free, by_run)) = made {
-            let id = data.catalogue.get(entry).id();
-            table.offer(data, Some((entry, id)), start, free, by_run);
-        }
-    }
-    for dependence in free {
+    for (dependence, by_run) in free.iter().zip(made) {
         let own = (0..dependence.width()).collect();
-        let by_run = (0..runs).map(|run| columns_of(dependence, run)).collect();
-        table.offer(data, None, Vec::new(), own, by_run);
+        table.offer(None, Vec::new(), own, by_run);
     }
     table
 }
 
 impl Table {
-    /// Enters columns of one run, as means over its blocks.
-    fn enter(&mut self, data: &Data, run: usize, triples: impl IntoIterator<Item = Triple>) {
+    /// Enters columns of one run.
+    fn enter(&mut self, run: usize, triples: impl IntoIterator<Item = Triple>) {
         for triple in triples {
             for (b, column) in triple.into_iter().enumerate() {
-                self.columns[b][run].push(data.blocks[run][b].mean(&column));
+                self.columns[b][run].push(column);
+            }
+        }
+    }
+
+    /// Enters every mechanism at every start, where it changes anything of the residual here.
+    fn offer_mechanisms(
+        &mut self,
+        data: &Data,
+        model: &Model,
+        starts: Vec<(usize, Vec<f64>)>,
+        here: &[Triple],
+    ) {
+        let made: Vec<Option<Own>> = starts
+            .par_iter()
+            .map(|(entry, start)| column_of(data, model, *entry, start, here))
+            .collect();
+        for ((entry, start), made) in starts.into_iter().zip(made) {
+            if let Some((free, by_run)) = made {
+                let id = data.catalogue.get(entry).id();
+                self.offer(Some((entry, id)), start, free, by_run);
             }
         }
     }
@@ -164,7 +169,6 @@ impl Table {
     /// Enters a candidate behind the last one.
     fn offer(
         &mut self,
-        data: &Data,
         mechanism: Option<(usize, Id)>,
         start: Vec<f64>,
         free: Vec<usize>,
@@ -173,7 +177,7 @@ impl Table {
         let from = self.candidates.last().map_or(0, |c| c.columns.end);
         let width = by_run.first().map_or(0, Vec::len);
         for (run, triples) in by_run.into_iter().enumerate() {
-            self.enter(data, run, triples);
+            self.enter(run, triples);
         }
         self.candidates.push(Candidate {
             entry: mechanism.map(|(entry, _)| entry),
@@ -197,12 +201,13 @@ fn starts(
         series: &data.series,
         residuals,
     };
-    data.catalogue
-        .entries()
-        .iter()
-        .enumerate()
+    let entries = data.catalogue.entries().iter().enumerate();
+    let asked: Vec<_> = entries
         .filter(|(entry, m)| wanted(m.id()) && !model.terms.iter().any(|t| t.entry == *entry))
-        .flat_map(|(entry, m)| m.starts(&search).into_iter().map(move |s| (entry, s)))
+        .collect();
+    asked
+        .into_par_iter()
+        .flat_map_iter(|(entry, m)| m.starts(&search).into_iter().map(move |s| (entry, s)))
         .collect()
 }
 
@@ -222,7 +227,10 @@ fn column_of(
     let first = model.vector().len();
     let difference: Vec<Triple> = (0..data.series.len())
         .map(|run| {
-            let (a, b) = (plain(data, &with, run), &here[run]);
+            let p = with.vector();
+            let series = &data.series[run];
+            let with = moved_rows(&data.catalogue, &with, &p, series, &data.context);
+            let (a, b) = (values(with), &here[run]);
             core::array::from_fn(|i| a[i].iter().zip(&b[i]).map(|(a, b)| a - b).collect())
         })
         .collect();
@@ -234,10 +242,9 @@ fn column_of(
             .sum::<f64>()
     };
     if energy(&difference) > 0.0 {
-        return Some((
-            Vec::new(),
-            difference.into_iter().map(|t| vec![t]).collect(),
-        ));
+        let by_run = difference.iter().enumerate();
+        let by_run = by_run.map(|(run, t)| vec![means(data, run, t)]);
+        return Some((Vec::new(), by_run.collect()));
     }
     let which: Vec<usize> = (first..first + start.len()).collect();
     let all: Vec<Vec<Triple>> = (0..data.series.len())
@@ -253,8 +260,9 @@ fn column_of(
         return None;
     }
     let kept = all
-        .into_iter()
-        .map(|run| free.iter().map(|i| run[*i].clone()).collect())
+        .iter()
+        .enumerate()
+        .map(|(run, own)| free.iter().map(|i| means(data, run, &own[*i])).collect())
         .collect();
     Some((free, kept))
 }

@@ -1,6 +1,10 @@
 //! A free dependence on one variable: what is said where no mechanism of the vocabulary accounts for a mismatch, and
 //! what every mechanism has to compete with.
 
+use std::sync::Arc;
+
+use rayon::prelude::*;
+
 use super::rows::Triple;
 use crate::correction::{Action, Levers, hat, knots_among};
 use crate::data::Data;
@@ -30,7 +34,7 @@ pub struct Dependence {
     /// The knot at which a dependence of friction is one: the law's own peak friction holds there. The fullest one.
     reference: Option<usize>,
     /// The variable by run and sample.
-    values: Vec<Vec<f64>>,
+    values: Arc<Vec<Vec<f64>>>,
 }
 
 /// Columns of these dependences together.
@@ -80,43 +84,49 @@ fn fullest(data: &Data, values: &[Vec<f64>], balance: Balance, knots: &[f64]) ->
 /// All dependences that a campaign can show.
 #[must_use]
 pub fn all(data: &Data) -> Vec<Dependence> {
+    Variable::all(data)
+        .into_par_iter()
+        .flat_map_iter(|variable| on(data, &variable))
+        .collect()
+}
+
+/// All dependences on one variable.
+fn on(data: &Data, variable: &Variable) -> Vec<Dependence> {
     let mut out = Vec::new();
-    for variable in Variable::all(data) {
-        let values: Vec<Vec<f64>> = (0..data.series.len())
-            .map(|run| variable.values(data, run))
+    let runs = 0..data.series.len();
+    let values: Vec<Vec<f64>> = runs.map(|run| variable.values(data, run)).collect();
+    let values = Arc::new(values);
+    for balance in [Balance::Tyre, Balance::Wheel, Balance::Vehicle] {
+        if !data.forms(balance) || holds_own_noise(variable, balance) {
+            continue;
+        }
+        // What was recorded beside the rig's channels may well act in proportion, and differ by run alone.
+        let recorded = matches!(variable, Variable::Column(_));
+        let counts: &[usize] = if recorded { &[KNOTS, 2] } else { &[KNOTS] };
+        let shapes: Vec<Vec<f64>> = counts
+            .iter()
+            .map(|&count| knots(data, &values, balance, count))
+            .filter(|knots| !knots.is_empty())
             .collect();
-        for balance in [Balance::Tyre, Balance::Wheel, Balance::Vehicle] {
-            if !data.forms(balance) || holds_own_noise(&variable, balance) {
-                continue;
-            }
-            // What was recorded beside the rig's channels may well act in proportion, and differ by run alone.
-            let recorded = matches!(variable, Variable::Column(_));
-            let counts: &[usize] = if recorded { &[KNOTS, 2] } else { &[KNOTS] };
-            let shapes: Vec<Vec<f64>> = counts
-                .iter()
-                .map(|&count| knots(data, &values, balance, count))
-                .filter(|knots| !knots.is_empty())
-                .collect();
-            let actions: &[Action] = if balance == Balance::Tyre {
-                &[Action::Friction, Action::Force]
-            } else {
-                &[Action::Force]
-            };
-            for (&action, knots) in actions
-                .iter()
-                .flat_map(|a| shapes.iter().map(move |k| (a, k)))
-            {
-                let reference =
-                    (action == Action::Friction).then(|| fullest(data, &values, balance, knots));
-                out.push(Dependence {
-                    balance,
-                    variable: variable.clone(),
-                    action,
-                    knots: knots.clone(),
-                    reference,
-                    values: values.clone(),
-                });
-            }
+        let actions: &[Action] = if balance == Balance::Tyre {
+            &[Action::Friction, Action::Force]
+        } else {
+            &[Action::Force]
+        };
+        for (&action, knots) in actions
+            .iter()
+            .flat_map(|a| shapes.iter().map(move |k| (a, k)))
+        {
+            let reference =
+                (action == Action::Friction).then(|| fullest(data, &values, balance, knots));
+            out.push(Dependence {
+                balance,
+                variable: variable.clone(),
+                action,
+                knots: knots.clone(),
+                reference,
+                values: Arc::clone(&values),
+            });
         }
     }
     out
@@ -144,39 +154,36 @@ impl Dependence {
     #[must_use]
     pub fn columns(&self, data: &Data, levers: &Levers, run: usize) -> Vec<Triple> {
         let (s, u) = (&data.series[run], &self.values[run]);
-        let n = s.len();
-        let height = |c: usize, k: usize| match hat(&self.knots, u[k]) {
+        let hats: Vec<Option<(usize, f64)>> = u.iter().map(|u| hat(&self.knots, *u)).collect();
+        let height = |c: usize, k: usize| match hats[k] {
             Some((at, w)) if at == c => 1.0 - w,
             Some((at, w)) if at + 1 == c => w,
             _ => 0.0,
         };
+        let formed = !s.segments(self.balance).is_empty();
+        let samples = if formed { s.len() } else { 0 };
         (0..self.knots.len())
             .filter(|c| self.reference != Some(*c))
             .map(|c| {
-                let mut triple = [Balance::Tyre, Balance::Wheel, Balance::Vehicle].map(|b| {
-                    let formed = !s.segments(b).is_empty();
-                    vec![0.0; if formed { n } else { 0 }]
-                });
-                let into = &mut triple[self.balance as usize];
                 let mut sum = 0.0;
-                for (k, into) in into.iter_mut().enumerate() {
-                    *into = match self.balance {
-                        Balance::Tyre => {
-                            finite_or_zero(-height(c, k) * levers.of(data, self.action, run, k))
-                        }
-                        Balance::Wheel | Balance::Vehicle => {
-                            let lever = if self.balance == Balance::Wheel {
-                                data.context.radius
-                            } else {
-                                1.0
-                            };
-                            sum += finite_or_zero(
-                                height(c, k) * lever * data.context.mean_load * s.dt[k].min(0.1),
-                            );
-                            sum
-                        }
-                    };
-                }
+                let entry = |k: usize| match self.balance {
+                    Balance::Tyre => {
+                        finite_or_zero(-height(c, k) * levers.of(data, self.action, run, k))
+                    }
+                    Balance::Wheel | Balance::Vehicle => {
+                        let lever = if self.balance == Balance::Wheel {
+                            data.context.radius
+                        } else {
+                            1.0
+                        };
+                        sum += finite_or_zero(
+                            height(c, k) * lever * data.context.mean_load * s.dt[k].min(0.1),
+                        );
+                        sum
+                    }
+                };
+                let mut triple = Triple::default();
+                triple[self.balance as usize] = (0..samples).map(entry).collect();
                 triple
             })
             .collect()

@@ -1,11 +1,13 @@
 //! Sizes of the noise's parts by restricted maximum likelihood, along its exact slopes.
 
+use std::sync::Arc;
+
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-use super::gram::{Columns, innovations, products, solve};
+use super::gram::{Columns, Packed, Solved, solve};
 use super::noise::{BalanceParts, Source};
-use super::whiten::{ByVariance, Kind, Whitener};
+use super::whiten::{ByVariance, Course, Kind, Lanes, Whitener, traces, whiteners};
 use crate::data::Data;
 
 /// Prior standard deviation of a part's log size about where it starts: wide, so that a part that the data say
@@ -33,7 +35,7 @@ pub struct Readings<'a> {
     /// Columns by run, the residual first; all others are fitted.
     pub columns: &'a [Columns],
     /// Prior precision by column.
-    pub precision: &'a dyn Fn(usize) -> f64,
+    pub precision: &'a (dyn Fn(usize) -> f64 + Sync),
     /// Inner products of the same columns in all other balances, which share the coefficients.
     pub others: &'a DMatrix<f64>,
     /// Every so many samples.
@@ -60,12 +62,6 @@ fn penalty_slope(source: &Source) -> f64 {
     (source.log_std - source.log_start) / (PRIOR * PRIOR) + beyond(source) / PRIOR_BEYOND
 }
 
-struct Filtered {
-    whitener: Whitener,
-    which: Vec<usize>,
-    white: Vec<Vec<f64>>,
-}
-
 /// The balance under noise of these sizes.
 struct Loss {
     /// Negative restricted log likelihood with the prior of the sizes, in nats.
@@ -78,71 +74,124 @@ struct Loss {
     balance: DVector<f64>,
 }
 
-/// `None` where the columns cannot be told apart, or where the value is no lower than `below`: slopes cost more than
-/// the value, and are of use only where a step is taken.
-fn loss(readings: &Readings<'_>, parts: &BalanceParts, below: f64) -> Result<Loss, Option<f64>> {
-    let Readings {
-        data,
-        columns,
-        precision,
-        others,
-        stride,
-    } = *readings;
-    let q = columns.iter().map(Vec::len).max().unwrap_or(0);
-    let filtered: Vec<(usize, Filtered)> = (0..data.series.len())
-        .into_par_iter()
-        .filter(|run| columns[*run].first().is_some_and(|c| !c.is_empty()))
-        .map(|run| {
-            let whitener = parts.whitener(data, run, stride);
-            let (which, white) = innovations(&whitener, &columns[run]);
-            (
-                run,
-                Filtered {
-                    whitener,
-                    which,
-                    white,
-                },
-            )
-        })
-        .collect();
-    let mut sum = others.clone();
-    let mut log_variance = 0.0;
-    for (_, f) in &filtered {
-        sum += products(q, &f.which, &f.white, 0, f.whitener.samples.len());
-        log_variance += f.whitener.log_variances.iter().sum::<f64>();
-    }
-    let fitted: Vec<usize> = (1..q).filter(|i| sum[(*i, *i)] > 0.0).collect();
-    let solved = solve(&sum, &fitted, precision).ok_or(None)?;
-    let value = 0.5 * (log_variance + solved.rss + solved.log_det) + penalty(parts);
-    if !(value < below) {
-        return Err(value.is_finite().then_some(value));
-    }
-    // What is left of the residual, then the directions in which the fitted columns are not known.
-    let unknown = &solved.unknown;
-    let mut weights = DMatrix::zeros(q, 1 + fitted.len());
-    weights[(0, 0)] = 1.0;
-    for (i, &column) in fitted.iter().enumerate() {
-        weights[(column, 0)] = solved.coefficients[i];
-        for j in 0..fitted.len() {
-            weights[(column, 1 + j)] = unknown[(i, j)];
+/// A run's readings of a balance.
+struct OfRun {
+    course: Arc<Course>,
+    columns: Packed,
+}
+
+/// What stays whatever the sizes are.
+struct Fitting<'a> {
+    readings: &'a Readings<'a>,
+    runs: Vec<OfRun>,
+    courses: Vec<Option<Arc<Course>>>,
+    /// Number of columns.
+    width: usize,
+}
+
+impl<'a> Fitting<'a> {
+    fn new(readings: &'a Readings<'a>, parts: &BalanceParts) -> Self {
+        let columns = readings.columns;
+        let courses = parts.courses(readings.data, readings.stride);
+        let runs = courses
+            .into_par_iter()
+            .zip(columns)
+            .filter_map(|(course, own)| {
+                let course = course.filter(|_| own.first().is_some_and(|c| !c.is_empty()))?;
+                Some(OfRun {
+                    columns: Packed::new(own, &course.samples),
+                    course,
+                })
+            });
+        let runs: Vec<OfRun> = runs.collect();
+        Self {
+            readings,
+            courses: runs
+                .iter()
+                .map(|run| Some(Arc::clone(&run.course)))
+                .collect(),
+            runs,
+            width: columns.iter().map(Vec::len).max().unwrap_or(0),
         }
     }
-    let shares: Vec<[DVector<f64>; 2]> = filtered
-        .par_iter()
-        .map(|(run, f)| shares(parts, *run, f, &weights))
-        .collect();
+
+    /// `None` where the columns cannot be told apart, or where the value is no lower than `below`: slopes cost more than
+    /// the value, and are of use only where a step is taken.
+    fn loss(&self, parts: &BalanceParts, below: f64) -> Result<Loss, Option<f64>> {
+        let q = self.width;
+        let whiteners = whiteners(&self.courses, &parts.sizes());
+        let whiteners: Vec<&Whitener> = whiteners.iter().flatten().collect();
+        let white: Vec<(Lanes, DMatrix<f64>)> = whiteners
+            .par_iter()
+            .zip(&self.runs)
+            .map(|(whitener, run)| {
+                let white = whitener.apply(&run.columns.lanes);
+                let products = run.columns.products(q, &white, 0, whitener.samples().len());
+                (white, products)
+            })
+            .collect();
+        let mut sum = self.readings.others.clone();
+        let mut log_variance = 0.0;
+        for (whitener, (_, products)) in whiteners.iter().zip(&white) {
+            sum += products;
+            log_variance += whitener.log_variances().iter().sum::<f64>();
+        }
+        let fitted: Vec<usize> = (1..q).filter(|i| sum[(*i, *i)] > 0.0).collect();
+        let solved = solve(&sum, &fitted, self.readings.precision).ok_or(None)?;
+        let value = 0.5 * (log_variance + solved.rss + solved.log_det) + penalty(parts);
+        if !(value < below) {
+            return Err(value.is_finite().then_some(value));
+        }
+        let weights = weights(q, &fitted, &solved);
+        let explained: Vec<[ByVariance; 2]> = whiteners
+            .par_iter()
+            .zip(&self.runs)
+            .zip(&white)
+            .map(|((whitener, run), (white, _))| {
+                let own = weights.select_rows(&run.columns.which);
+                whitener.explained(white, &own)
+            })
+            .collect();
+        slopes(parts, value, &traces(&whiteners), &explained)
+    }
+}
+
+/// By column, how much of it is in each direction in which the fitted columns are not known, and in what is left of the
+/// residual, the last.
+fn weights(q: usize, fitted: &[usize], solved: &Solved) -> DMatrix<f64> {
+    let unknown = &solved.unknown;
+    let last = fitted.len();
+    let mut weights = DMatrix::zeros(q, 1 + last);
+    weights[(0, last)] = 1.0;
+    for (i, &column) in fitted.iter().enumerate() {
+        weights[(column, last)] = solved.coefficients[i];
+        for j in 0..last {
+            weights[(column, j)] = unknown[(i, j)];
+        }
+    }
+    weights
+}
+
+/// The loss with its slopes from what the runs' readings say of every part: what it takes up (the trace), and what it
+/// explains of the directions that are not known and of what is left.
+fn slopes(
+    parts: &BalanceParts,
+    value: f64,
+    traces: &[ByVariance],
+    explained: &[[ByVariance; 2]],
+) -> Result<Loss, Option<f64>> {
     let n = parts.sources.len();
-    let [trace, square] = shares
-        .into_iter()
-        .fold([DVector::zeros(n), DVector::zeros(n)], |a, b| {
-            [&a[0] + &b[0], &a[1] + &b[1]]
-        });
+    let [mut trace, mut square] = [DVector::zeros(n), DVector::zeros(n)];
+    for (own, [unknown, left]) in traces.iter().zip(explained) {
+        trace += by_size(parts, own) - by_size(parts, unknown);
+        square += by_size(parts, left);
+    }
     let prior = |i: usize| penalty_slope(&parts.sources[i]);
     let loss = Loss {
         value,
         slope: DVector::from_fn(n, |i, _| trace[i] - square[i] + prior(i)),
         balance: DVector::from_fn(n, |i, _| {
-            let step = 0.5 * (square[i] / trace[i]).ln();
+            let step = 0.5 * f64::ln(square[i] / trace[i]);
             if step.is_finite() {
                 step.clamp(-LONGEST_STEP, LONGEST_STEP)
             } else {
@@ -154,43 +203,17 @@ fn loss(readings: &Readings<'_>, parts: &BalanceParts, below: f64) -> Result<Los
     if finite { Ok(loss) } else { Err(None) }
 }
 
-/// What a run's readings say of every part: what it takes up (the trace), and what it explains.
-fn shares(
-    parts: &BalanceParts,
-    run: usize,
-    filtered: &Filtered,
-    weights: &DMatrix<f64>,
-) -> [DVector<f64>; 2] {
-    let n = filtered.whitener.samples.len();
-    let which = &filtered.which;
-    let white = DMatrix::from_fn(n, which.len(), |k, i| filtered.white[i][k]);
-    let used = DMatrix::from_fn(which.len(), weights.ncols(), |i, j| weights[(which[i], j)]);
-    let combined = white * used;
-    let combined: Vec<&[f64]> = (0..weights.ncols())
-        .map(|j| &combined.as_slice()[j * n..(j + 1) * n])
-        .collect();
-    let own = parts.parts(run);
-    let by_size = |x: &ByVariance| {
-        let mut at = 0;
-        DVector::from_iterator(
-            parts.sources.len(),
-            parts.sources.iter().map(|s| {
-                let by_variance = if s.kind.is_some() {
-                    at += 1;
-                    x.parts[at - 1]
-                } else {
-                    x.white
-                };
-                (2.0 * s.log_std).exp() * by_variance
-            }),
-        )
-    };
-    let trace = by_size(&filtered.whitener.traces(&own))
-        - by_size(&filtered.whitener.squares(&combined[1..], &own));
-    [
-        trace,
-        by_size(&filtered.whitener.squares(&combined[..1], &own)),
-    ]
+/// What a unit of each part's variance does, times that variance.
+fn by_size(parts: &BalanceParts, of: &ByVariance) -> DVector<f64> {
+    let mut remembered = of.parts.iter();
+    let sources = parts.sources.iter().map(|s| {
+        let own = match s.kind {
+            Some(_) => remembered.next().copied().unwrap_or(0.0),
+            None => of.white,
+        };
+        (2.0 * s.log_std).exp() * own
+    });
+    DVector::from_iterator(parts.sources.len(), sources)
 }
 
 /// Steps that balance what the parts explain before the search turns to the slopes.
@@ -199,7 +222,8 @@ const BALANCING_STEPS: usize = 6;
 /// Fits the log sizes of all parts: first by balancing them, then by a quasi-Newton search (Broyden, Fletcher,
 /// Goldfarb, Shanno), in at most so many steps; the loss that is reached.
 pub fn fit(readings: &Readings<'_>, parts: &mut BalanceParts, steps: usize) -> f64 {
-    let Ok(mut here) = loss(readings, parts, f64::INFINITY) else {
+    let fitting = Fitting::new(readings, parts);
+    let Ok(mut here) = fitting.loss(parts, f64::INFINITY) else {
         return f64::INFINITY;
     };
     let mut inverse: Option<DMatrix<f64>> = None;
@@ -211,7 +235,7 @@ pub fn fit(readings: &Readings<'_>, parts: &mut BalanceParts, steps: usize) -> f
         } else {
             -(inverse.as_ref().unwrap_or(&start) * &here.slope)
         };
-        let Some((there, next)) = along(readings, parts, &here, direction) else {
+        let Some((there, next)) = along(&fitting, parts, &here, direction) else {
             if balancing || inverse.take().is_some() {
                 continue;
             }
@@ -249,7 +273,7 @@ fn preconditioner(here: &Loss) -> DMatrix<f64> {
 
 /// The first place along a direction where the loss falls as its slope promises; `None` where there is none.
 fn along(
-    readings: &Readings<'_>,
+    fitting: &Fitting<'_>,
     parts: &BalanceParts,
     here: &Loss,
     mut direction: DVector<f64>,
@@ -271,7 +295,7 @@ fn along(
             };
             s.log_std = (s.log_std + share * by).clamp(s.log_start - reach, s.log_start + reach);
         }
-        match loss(readings, &there, here.value + ENOUGH * share * promised) {
+        match fitting.loss(&there, here.value + ENOUGH * share * promised) {
             Ok(next) => return Some((there, next)),
             // The lowest point of the parabola through value, slope and what was met.
             Err(Some(value)) => {

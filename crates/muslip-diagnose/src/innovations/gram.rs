@@ -3,10 +3,7 @@
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-use super::noise::BalanceParts;
-use super::whiten::Whitener;
-use crate::data::Data;
-use crate::number::finite_or_zero;
+use super::whiten::{Lanes, Whitener};
 
 /// Columns of one run in one balance: the residual first.
 pub type Columns = Vec<Vec<f64>>;
@@ -51,72 +48,67 @@ pub fn total(grams: &[[Gram; 2]]) -> Gram {
     sum
 }
 
-/// Inner products of every run's columns in one balance under its noise, first and second half apart.
+/// Filters of every run of one balance under its noise; nothing where a run does not form it.
+pub type Filters = Vec<Option<Whitener>>;
+
+/// Inner products of every run's columns in one balance through its filters, first and second half apart.
 #[must_use]
-pub fn grams(
-    data: &Data,
-    parts: &BalanceParts,
-    columns: &[Columns],
-    stride: usize,
-) -> Vec<[Gram; 2]> {
-    (0..data.series.len())
-        .into_par_iter()
-        .map(|run| gram(data, parts, run, &columns[run], stride))
+pub fn grams(filters: &Filters, columns: &[Columns]) -> Vec<[Gram; 2]> {
+    let runs = filters.par_iter().zip(columns);
+    runs.map(|(filter, columns)| gram(filter.as_ref(), columns))
         .collect()
 }
 
-fn gram(
-    data: &Data,
-    parts: &BalanceParts,
-    run: usize,
-    columns: &[Vec<f64>],
-    stride: usize,
-) -> [Gram; 2] {
+fn gram(whitener: Option<&Whitener>, columns: &[Vec<f64>]) -> [Gram; 2] {
     let q = columns.len();
-    if q == 0 || columns[0].is_empty() {
+    let Some(whitener) = whitener.filter(|_| q > 0 && !columns[0].is_empty()) else {
         return [Gram::empty(q), Gram::empty(q)];
-    }
-    let whitener = parts.whitener(data, run, stride);
-    let (which, white) = innovations(&whitener, columns);
-    let n = whitener.samples.len();
+    };
+    let packed = Packed::new(columns, whitener.samples());
+    let white = whitener.apply(&packed.lanes);
+    let n = whitener.samples().len();
     let middle = n / 2;
     [(0, middle), (middle, n)].map(|(from, to)| Gram {
-        products: products(q, &which, &white, from, to),
-        log_variance: whitener.log_variances[from..to].iter().sum(),
+        products: packed.products(q, &white, from, to),
+        log_variance: whitener.log_variances()[from..to].iter().sum(),
         count: to - from,
     })
 }
 
-/// Innovations of the columns that are not nothing, and which these are.
-#[must_use]
-pub fn innovations(whitener: &Whitener, columns: &[Vec<f64>]) -> (Vec<usize>, Vec<Vec<f64>>) {
-    let which: Vec<usize> = (0..columns.len())
-        .filter(|i| columns[*i].iter().any(|x| *x != 0.0))
-        .collect();
-    let refs: Vec<&[f64]> = which.iter().map(|i| columns[*i].as_slice()).collect();
-    (which, whitener.apply(&refs))
+/// The columns of one run that are not nothing, at the samples in use.
+pub struct Packed {
+    /// Which they are.
+    pub which: Vec<usize>,
+    /// They.
+    pub lanes: Lanes,
 }
 
-/// Inner products over some of the innovations, among `q` columns.
-#[must_use]
-pub fn products(
-    q: usize,
-    which: &[usize],
-    white: &[Vec<f64>],
-    from: usize,
-    to: usize,
-) -> DMatrix<f64> {
-    let stacked = DMatrix::from_fn(which.len(), to - from, |i, k| {
-        finite_or_zero(white[i][from + k])
-    });
-    let own = &stacked * stacked.transpose();
-    let mut all = DMatrix::zeros(q, q);
-    for (i, &a) in which.iter().enumerate() {
-        for (j, &b) in which.iter().enumerate() {
-            all[(a, b)] = own[(i, j)];
+impl Packed {
+    /// Of all columns.
+    #[must_use]
+    pub fn new(columns: &[Vec<f64>], samples: &[usize]) -> Self {
+        let which: Vec<usize> = (0..columns.len())
+            .filter(|i| columns[*i].iter().any(|x| *x != 0.0))
+            .collect();
+        let own: Vec<&[f64]> = which.iter().map(|i| columns[*i].as_slice()).collect();
+        Self {
+            lanes: Lanes::of(&own, samples),
+            which,
         }
     }
-    all
+
+    /// Inner products over some of their innovations, among all `q` columns.
+    #[must_use]
+    pub fn products(&self, q: usize, white: &Lanes, from: usize, to: usize) -> DMatrix<f64> {
+        let own = white.products(from, to);
+        let mut all = DMatrix::zeros(q, q);
+        for (i, &a) in self.which.iter().enumerate() {
+            for (j, &b) in self.which.iter().enumerate() {
+                all[(a, b)] = own[(i, j)];
+            }
+        }
+        all
+    }
 }
 
 /// Least squares on inner products with a Gaussian prior on the coefficients.

@@ -3,6 +3,7 @@
 pub mod blocks;
 pub mod candidates;
 pub mod dependence;
+pub mod derivatives;
 pub mod estimate;
 pub mod gram;
 pub mod hypothesis;

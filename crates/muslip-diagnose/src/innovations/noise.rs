@@ -1,7 +1,11 @@
 //! The noise of the three balances: which parts there are, by what they enter, and how large they start.
 
+use std::sync::Arc;
+
+use rayon::prelude::*;
+
 use super::rows::quiet_force;
-use super::whiten::{DIFFUSE, Kind, Part, Whitener};
+use super::whiten::{Course, DIFFUSE, Kind, MOST, Part, Sizes};
 use crate::audit::colour::Colour;
 use crate::data::Data;
 use crate::mechanism::Balance;
@@ -18,6 +22,9 @@ const LONGEST_MEMORY_S: f64 = 0.1;
 /// Memory in s of the vehicle speed's slow noise where the audit knows none.
 const VEHICLE_MEMORY_S: f64 = 0.2;
 
+/// Gains by run and block.
+type Gains = Vec<Vec<f64>>;
+
 /// One part of a balance's noise over the campaign.
 #[derive(Clone, Debug)]
 pub struct Source {
@@ -25,8 +32,8 @@ pub struct Source {
     pub name: &'static str,
     /// How it goes in time; `None` is the readings' own white noise.
     pub kind: Option<Kind>,
-    /// Gain by run and sample; an empty run where by one.
-    pub gain: Vec<Vec<f64>>,
+    /// Gain by run and block; an empty run where by one. Sizes are tried by the hundred: all share it.
+    pub gain: Arc<Gains>,
     /// Natural logarithm of its standard deviation.
     pub log_std: f64,
     /// The same as it starts, from the sensors' own noise.
@@ -69,7 +76,8 @@ impl Slopes {
     #[must_use]
     pub fn new(data: &Data, model: &Model) -> Self {
         let p = model.vector();
-        let radius = data.context.radius;
+        let of_run = |s: &Series| Self::of_run(data, model, &p, s);
+        let by_run: Vec<[Vec<f64>; 5]> = data.series.par_iter().map(of_run).collect();
         let mut out = Self {
             wheel: Vec::new(),
             speed: Vec::new(),
@@ -77,28 +85,7 @@ impl Slopes {
             slip: Vec::new(),
             curvature: Vec::new(),
         };
-        for s in &data.series {
-            let step = CURVE_STEP * model.base[1].exp();
-            let [before, here, after] = [-step, 0.0, step].map(|beyond| {
-                friction::<f64>(&data.catalogue, model, &p, s, &data.context, beyond).friction
-            });
-            let mut all = [const { Vec::new() }; 5];
-            for k in 0..s.len() {
-                let (v, omega, load) = (s.speed.smooth[k], s.wheel.smooth[k], s.load.smooth[k]);
-                let [mut force, mut slope, mut bend] = [0.0; 3];
-                if s.rolling[k] {
-                    force = load * here[k];
-                    slope = load * (after[k] - before[k]) / (2.0 * step);
-                    bend = load * (after[k] - 2.0 * here[k] + before[k]) / (step * step);
-                }
-                let [by_wheel, by_speed] = slip::slopes(radius, omega, v);
-                all[0].push(finite_or_zero(slope * by_wheel));
-                all[1].push(finite_or_zero(slope * by_speed));
-                all[2].push(finite_or_zero(force));
-                all[3].push(finite_or_zero(slope));
-                all[4].push(finite_or_zero(bend));
-            }
-            let [wheel, speed, force, slip, curvature] = all;
+        for [wheel, speed, force, slip, curvature] in by_run {
             out.wheel.push(wheel);
             out.speed.push(speed);
             out.force.push(force);
@@ -106,6 +93,30 @@ impl Slopes {
             out.curvature.push(curvature);
         }
         out
+    }
+
+    /// On one run, in the order of the fields.
+    fn of_run(data: &Data, model: &Model, p: &[f64], s: &Series) -> [Vec<f64>; 5] {
+        let step = CURVE_STEP * model.base[1].exp();
+        let [before, here, after] = [-step, 0.0, step].map(|beyond| {
+            friction::<f64>(&data.catalogue, model, p, s, &data.context, beyond).friction
+        });
+        let mut all = [(); 5].map(|()| Vec::with_capacity(s.len()));
+        for k in 0..s.len() {
+            let (v, omega, load) = (s.speed.smooth[k], s.wheel.smooth[k], s.load.smooth[k]);
+            let [mut force, mut slope, mut bend] = [0.0; 3];
+            if s.rolling[k] {
+                force = load * here[k];
+                slope = load * (after[k] - before[k]) / (2.0 * step);
+                bend = load * (after[k] - 2.0 * here[k] + before[k]) / (step * step);
+            }
+            let [by_wheel, by_speed] = slip::slopes(data.context.radius, omega, v);
+            let own = [slope * by_wheel, slope * by_speed, force, slope, bend];
+            for (into, own) in all.iter_mut().zip(own) {
+                into.push(finite_or_zero(own));
+            }
+        }
+        all
     }
 }
 
@@ -161,28 +172,20 @@ fn by_blocks(data: &Data, balance: Balance, mut sources: Vec<Source>) -> Balance
             (count + 1.0, samples + block.len() as f64)
         });
     let less = 0.5 * f64::ln(f64::max(samples, 1.0) / f64::max(count, 1.0));
-    for source in &mut sources {
-        source.gain = source
-            .gain
-            .iter()
-            .zip(&data.blocks)
-            .map(|(gain, blocks)| blocks[balance as usize].mean(gain))
-            .collect();
-        if source.kind.is_none() {
-            source.log_std -= less;
-            source.log_start -= less;
-        }
+    for source in sources.iter_mut().filter(|s| s.kind.is_none()) {
+        source.log_std -= less;
+        source.log_start -= less;
     }
     BalanceParts { balance, sources }
 }
 
 impl Source {
     /// A part that starts at this standard deviation and may become as large as the data say.
-    fn new(name: &'static str, kind: Option<Kind>, gain: &[Vec<f64>], std: f64) -> Self {
+    fn new(name: &'static str, kind: Option<Kind>, gain: &Arc<Gains>, std: f64) -> Self {
         Self {
             name,
             kind,
-            gain: gain.to_vec(),
+            gain: Arc::clone(gain),
             log_std: std.max(1e-12).ln(),
             log_start: std.max(1e-12).ln(),
             log_cap: f64::INFINITY,
@@ -233,7 +236,7 @@ struct Sensors<'a> {
     coloured: f64,
     colour_time: f64,
     /// Gains of what enters as it is.
-    none: Vec<Vec<f64>>,
+    none: Arc<Gains>,
     /// Time since the start of each run.
     time: Vec<Vec<f64>>,
     /// The law's force, for the reading's own noise, integrated, is the walk: scaling it would buy the walk away.
@@ -261,7 +264,7 @@ impl<'a> Sensors<'a> {
                 .clamp(SHORTEST_MEMORY_S, LONGEST_MEMORY_S),
             coloured: colour.std.max(0.3 * speed),
             colour_time: colour.time,
-            none: vec![Vec::new(); s.len()],
+            none: Arc::new(vec![Vec::new(); s.len()]),
             time: s
                 .iter()
                 .map(|s| s.time.iter().map(|t| t - s.time[0]).collect())
@@ -274,21 +277,31 @@ impl<'a> Sensors<'a> {
         }
     }
 
+    /// Gains of what enters by these columns, as means over a balance's blocks.
+    fn by_blocks(&self, balance: Balance, columns: &[Vec<f64>]) -> Arc<Gains> {
+        let runs = columns.iter().zip(&self.data.blocks);
+        Arc::new(
+            runs.map(|(gain, blocks)| blocks[balance as usize].mean(gain))
+                .collect(),
+        )
+    }
+
     fn tyre(&self) -> Vec<Source> {
-        let (none, force) = (&self.none, &self.slopes.force);
+        let gain = |columns: &[Vec<f64>]| self.by_blocks(Balance::Tyre, columns);
+        let (none, force) = (&self.none, &gain(&self.slopes.force));
         vec![
             Source::new("white", None, none, self.drag),
             Source::new(
                 "wheel speed",
                 forgetting(self.smoothed),
-                &self.slopes.wheel,
+                &gain(&self.slopes.wheel),
                 0.5 * self.wheel,
             )
             .of_slip(),
             Source::new(
                 "vehicle speed",
                 forgetting(self.colour_time),
-                &self.slopes.speed,
+                &gain(&self.slopes.speed),
                 self.coloured,
             )
             .of_slip(),
@@ -298,11 +311,12 @@ impl<'a> Sensors<'a> {
             Source::new("friction of a run", OF_A_RUN, force, 0.002).at_most(0.005),
             Source::new("zero of a run", OF_A_RUN, none, 0.1 * self.drag)
                 .at_most(0.002 * self.data.context.max_drag),
-            Source::new("slip of a run", OF_A_RUN, &self.slopes.slip, 1e-4).at_most(5e-4),
+            Source::new("slip of a run", OF_A_RUN, &gain(&self.slopes.slip), 1e-4).at_most(5e-4),
         ]
     }
 
     fn wheel(&self) -> Vec<Source> {
+        let gain = |columns: &[Vec<f64>]| self.by_blocks(Balance::Wheel, columns);
         let (none, context) = (&self.none, &self.data.context);
         let (radius, inertia) = (context.radius, context.inertia);
         let turned: Vec<Vec<f64>> = self
@@ -334,11 +348,11 @@ impl<'a> Sensors<'a> {
                 0.01 * walk / root,
             )
             .at_most(0.03 * walk / root),
-            Source::new("torque's scale of a run", OF_A_RUN, &turned, 0.002).at_most(0.005),
+            Source::new("torque's scale of a run", OF_A_RUN, &gain(&turned), 0.002).at_most(0.005),
             Source::new(
                 "torque's zero of a run",
                 OF_A_RUN,
-                &self.time,
+                &gain(&self.time),
                 0.001 * context.max_drag * radius,
             )
             .at_most(0.002 * context.max_drag * radius),
@@ -346,6 +360,7 @@ impl<'a> Sensors<'a> {
     }
 
     fn vehicle(&self) -> Vec<Source> {
+        let gain = |columns: &[Vec<f64>]| self.by_blocks(Balance::Vehicle, columns);
         let (none, context) = (&self.none, &self.data.context);
         let (mass, force) = (context.mass, context.max_drag);
         let root = context.dt.sqrt();
@@ -376,8 +391,14 @@ impl<'a> Sensors<'a> {
                 .at_most(0.2 * walk / root),
             Source::new("force, drifting", integrated(3.0), none, 0.01 * walk / root)
                 .at_most(0.03 * walk / root),
-            Source::new("drag's scale of a run", OF_A_RUN, &self.impulse, 0.002).at_most(0.005),
-            Source::new("force of a run", OF_A_RUN, &self.time, 0.001 * force)
+            Source::new(
+                "drag's scale of a run",
+                OF_A_RUN,
+                &gain(&self.impulse),
+                0.002,
+            )
+            .at_most(0.005),
+            Source::new("force of a run", OF_A_RUN, &gain(&self.time), 0.001 * force)
                 .at_most(0.002 * force),
         ]
     }
@@ -423,19 +444,37 @@ impl BalanceParts {
             .collect()
     }
 
-    /// Gains of the filter on every `stride`-th sample of one run.
+    /// Every `stride`-th reading of every run as the filter meets it; nothing of a run that does not form the balance.
     #[must_use]
-    pub fn whitener(&self, data: &Data, run: usize, stride: usize) -> Whitener {
+    pub fn courses(&self, data: &Data, stride: usize) -> Vec<Option<Arc<Course>>> {
+        (0..data.series.len())
+            .into_par_iter()
+            .map(|run| {
+                let formed = !data.series[run].segments(self.balance).is_empty();
+                let blocks = &data.blocks[run][self.balance as usize];
+                formed.then(|| {
+                    let parts = self.parts(run);
+                    Arc::new(Course::new(&blocks.time, &blocks.segments, stride, &parts))
+                })
+            })
+            .collect()
+    }
+
+    /// Sizes of all parts.
+    #[must_use]
+    pub fn sizes(&self) -> Sizes {
         // Of a level nothing is known, whatever the noise is taken to be: else the likelihood would count it.
         let start: f64 = self.sources.iter().map(|s| (2.0 * s.log_start).exp()).sum();
-        Whitener::new(
-            &data.blocks[run][self.balance as usize].time,
-            &data.blocks[run][self.balance as usize].segments,
-            stride,
-            self.white(),
-            DIFFUSE * start,
-            &self.parts(run),
-        )
+        let mut parts = [0.0; MOST];
+        let remembered = self.sources.iter().filter(|s| s.kind.is_some());
+        for (into, source) in parts.iter_mut().zip(remembered) {
+            *into = source.log_std.exp();
+        }
+        Sizes {
+            white: self.white(),
+            diffuse: DIFFUSE * start,
+            parts,
+        }
     }
 }
 

@@ -30,8 +30,12 @@ fn poles_for_delay(time: &[f64], dt: &[f64], force: &[f64], late: f64, poles: us
     let mut passed = force.to_vec();
     for _ in 0..poles {
         let mut out = passed.first().copied().unwrap_or(0.0);
+        let mut known = (f64::NAN, 0.0);
         for (x, dt) in passed.iter_mut().zip(dt) {
-            out += (1.0 - (-dt * poles as f64 / late).exp()) * (*x - out);
+            if *dt != known.0 {
+                known = (*dt, 1.0 - (-dt * poles as f64 / late).exp());
+            }
+            out += known.1 * (*x - out);
             *x = out;
         }
     }
@@ -80,9 +84,8 @@ struct Chain<'a> {
     speed_rate: Vec<f64>,
 }
 
-fn zero(_: usize) -> f64 {
-    0.0
-}
+/// What stands in a balance at each sample.
+type Entry<'a> = &'a dyn Fn(usize) -> f64;
 
 impl<'a> Chain<'a> {
     fn new(data: &'a Data, slopes: &'a Slopes, run: usize) -> Self {
@@ -98,39 +101,31 @@ impl<'a> Chain<'a> {
         }
     }
 
-    /// What stands in each balance, sample by sample, where the balance is formed.
-    fn columns(
-        &self,
-        tyre: impl Fn(usize) -> f64,
-        wheel: impl Fn(usize) -> f64,
-        vehicle: impl Fn(usize) -> f64,
-    ) -> Triple {
-        let column = |balance: Balance, f: &dyn Fn(usize) -> f64| -> Vec<f64> {
-            if self.series.segments(balance).is_empty() {
-                return Vec::new();
+    /// Means over the blocks of what stands in each balance, sample by sample, where the balance is formed; nothing
+    /// where it stands in none.
+    fn columns(&self, entries: [Option<Entry<'_>>; 3]) -> Triple {
+        let blocks = &self.data.blocks[self.run];
+        let balances = [Balance::Tyre, Balance::Wheel, Balance::Vehicle];
+        core::array::from_fn(|b| match entries[b] {
+            Some(entry) if !self.series.segments(balances[b]).is_empty() => {
+                blocks[b].mean_of(|k| finite_or_zero(entry(k)))
             }
-            let samples = 0..self.series.len();
-            samples.map(|k| finite_or_zero(f(k))).collect()
-        };
-        [
-            column(Balance::Tyre, &tyre),
-            column(Balance::Wheel, &wheel),
-            column(Balance::Vehicle, &vehicle),
-        ]
+            _ => Vec::new(),
+        })
     }
 
     /// Where the wheel speed reads so much less.
     fn by_wheel(&self, u: impl Fn(usize) -> f64) -> Triple {
         let slope = &self.slopes.wheel[self.run];
         let inertia = self.data.context.inertia;
-        self.columns(|k| -slope[k] * u(k), |k| inertia * u(k), zero)
+        self.columns([Some(&|k| -slope[k] * u(k)), Some(&|k| inertia * u(k)), None])
     }
 
     /// Where the vehicle speed reads so much less.
     fn by_speed(&self, u: impl Fn(usize) -> f64) -> Triple {
         let slope = &self.slopes.speed[self.run];
         let mass = self.data.context.mass;
-        self.columns(|k| -slope[k] * u(k), zero, |k| mass * u(k))
+        self.columns([Some(&|k| -slope[k] * u(k)), None, Some(&|k| mass * u(k))])
     }
 
     /// Zero-phase: what inputs and reading differ by in bandwidth, and what smoothing leaves of the slip's noise.
@@ -142,7 +137,7 @@ impl<'a> Chain<'a> {
             *force -= beside;
         }
         let mean = mean_twice_about(&s.time, &force, &s.tyre, reach);
-        self.columns(|k| force[k] - mean[k], zero, zero)
+        self.columns([Some(&|k| force[k] - mean[k]), None, None])
     }
 
     /// A mean over noisy slip is not the law at the mean slip: half its second derivative times the noise's variance.
@@ -157,7 +152,7 @@ impl<'a> Chain<'a> {
                 + (radius * s.wheel.smooth[k] / s.speed.smooth[k].powi(2) * s.speed.sigma).powi(2);
             -0.5 * self.slopes.curvature[self.run][k] * noise
         };
-        self.columns(curve, zero, zero)
+        self.columns([Some(&curve), None, None])
     }
 
     /// The same of a slip that moves within a window of a sensor or of the smoother: half the second derivative times
@@ -173,7 +168,7 @@ impl<'a> Chain<'a> {
             let rate = slip::rate(radius, speeds, [self.wheel_rate[k], self.speed_rate[k]]);
             -0.5 * self.slopes.curvature[self.run][k] * rate * rate
         };
-        self.columns(curve, zero, zero)
+        self.columns([Some(&curve), None, None])
     }
 
     /// What smoothing over this reach takes off a force or torque, integrated.
@@ -200,12 +195,11 @@ impl<'a> Chain<'a> {
     /// The brake smoothed, where it is integrated. A lag of the brake filters its reading's noise, and must find that
     /// done already; nothing does that to the drag's.
     fn by_brake(&self, reach: f64) -> Triple {
-        let torque = match &self.series.torque {
-            Some(torque) => torque.smooth.clone(),
-            None => vec![0.0; self.series.len()],
+        let Some(torque) = &self.series.torque else {
+            return Triple::default();
         };
-        let level = self.smoothed_away(&torque, reach);
-        self.columns(zero, |k| level[k], zero)
+        let level = self.smoothed_away(&torque.smooth, reach);
+        self.columns([None, Some(&|k| level[k]), None])
     }
 
     /// The drag smoothed, where it is integrated.
@@ -213,25 +207,24 @@ impl<'a> Chain<'a> {
         let force = quiet_force(self.series, &self.slopes.force[self.run]);
         let level = self.smoothed_away(&force, reach);
         let lever = -self.data.context.radius;
-        self.columns(zero, |k| lever * level[k], |k| level[k])
+        self.columns([None, Some(&|k| lever * level[k]), Some(&|k| level[k])])
     }
 
     /// A vehicle speed late by so many poles instead of by a delay.
     fn by_poles(&self, poles: usize) -> Triple {
         let s = self.series;
         let late = self.data.vehicle_late;
-        let level = if late > LEAST_POLE_S && !s.vehicle_balance.is_empty() {
-            let force = quiet_force(s, &self.slopes.force[self.run]);
-            let force: Vec<f64> = force.into_iter().map(finite_or_zero).collect();
-            poles_for_delay(&s.time, &s.dt, &force, late, poles)
-        } else {
-            vec![0.0; s.len()]
-        };
-        self.columns(zero, zero, |k| level[k])
+        if !(late > LEAST_POLE_S) || s.vehicle_balance.is_empty() {
+            return Triple::default();
+        }
+        let force = quiet_force(s, &self.slopes.force[self.run]);
+        let force: Vec<f64> = force.into_iter().map(finite_or_zero).collect();
+        let level = poles_for_delay(&s.time, &s.dt, &force, late, poles);
+        self.columns([None, None, Some(&|k| level[k])])
     }
 }
 
-/// The columns on one run, with the prior standard deviations of their coefficients.
+/// The columns on one run as means over blocks, with the prior standard deviations of their coefficients.
 pub fn nuisances(data: &Data, slopes: &Slopes, run: usize) -> Vec<(f64, Triple)> {
     let chain = Chain::new(data, slopes, run);
     let s = chain.series;
@@ -239,7 +232,8 @@ pub fn nuisances(data: &Data, slopes: &Slopes, run: usize) -> Vec<(f64, Triple)>
     let wheel_second = second(wheel_rate, &s.time);
     let speed_second = second(speed_rate, &s.time);
     let mean = data.context.mean_wheel_speed;
-    let torque = |k: usize| s.torque.as_ref().map_or(0.0, |t| t.smooth[k]);
+    let torque = s.torque.as_ref().map(|torque| &torque.smooth);
+    let braked = |k: usize| torque.map_or(0.0, |torque| torque[k]);
     let late = data.timing_std;
     vec![
         // Wheel speed late.
@@ -247,7 +241,7 @@ pub fn nuisances(data: &Data, slopes: &Slopes, run: usize) -> Vec<(f64, Triple)>
         // Vehicle speed late.
         (late.vehicle, chain.by_speed(|k| speed_rate[k])),
         // Brake late.
-        (late.brake, chain.columns(zero, torque, zero)),
+        (late.brake, chain.columns([None, Some(&braked), None])),
         // Wheel speed late by turn.
         (
             0.001,

@@ -43,6 +43,35 @@ pub fn rows_of(data: &Data, model: &Model, run: usize) -> Rows<f64> {
     rows(&data.catalogue, model, &p, &data.series[run], &data.context)
 }
 
+/// The tyre's row alone, which needs neither wheel nor vehicle.
+#[must_use]
+pub fn tyre_row_of(data: &Data, model: &Model, run: usize) -> Vec<f64> {
+    let p = model.vector();
+    tyre_rows(&data.catalogue, model, &p, &data.series[run], &data.context)
+}
+
+/// The same in any numbers.
+pub fn tyre_rows<T: Listed>(
+    catalogue: &Catalogue,
+    model: &Model,
+    p: &[T],
+    series: &Series,
+    context: &Context,
+) -> Vec<T> {
+    tyre_row(series, tyre(catalogue, model, p, series, context).force)
+}
+
+/// The reading less the model of it; nothing where the balance is not formed.
+fn tyre_row<T: Number>(series: &Series, mut force: Vec<T>) -> Vec<T> {
+    if series.tyre.is_empty() {
+        return Vec::new();
+    }
+    for (f, y) in force.iter_mut().zip(&series.drag) {
+        *f = -*f + *y;
+    }
+    force
+}
+
 /// The force by a law where there is one, else the reading less its noise, in N.
 #[must_use]
 pub fn quiet_force(series: &Series, law: &[f64]) -> Vec<f64> {
@@ -63,6 +92,54 @@ pub fn rows<T: Listed>(
     context: &Context,
 ) -> Rows<T> {
     let state = tyre(catalogue, model, p, series, context);
+    rows_beside(catalogue, model, p, series, context, state)
+}
+
+/// The same but for the rows of wheel and vehicle where no term of the model moves them: these are empty, for no
+/// parameter changes them.
+pub fn moved_rows<T: Listed>(
+    catalogue: &Catalogue,
+    model: &Model,
+    p: &[T],
+    series: &Series,
+    context: &Context,
+) -> Rows<T> {
+    let state = tyre(catalogue, model, p, series, context);
+    if moves_speeds(catalogue, model, &state) {
+        return rows_beside(catalogue, model, p, series, context, state);
+    }
+    Rows {
+        tyre: tyre_row(series, state.force),
+        wheel: Vec::new(),
+        vehicle: Vec::new(),
+    }
+}
+
+/// Whether any term changes the rows of wheel or vehicle: what it adds to the reading, what the speeds are read off by,
+/// what acts on wheel or vehicle.
+fn moves_speeds<T: Listed>(catalogue: &Catalogue, model: &Model, tyre: &State<T>) -> bool {
+    let moves = |entry: usize| {
+        let mechanism = catalogue.get(entry);
+        mechanism.stage() == Stage::Kinematics
+            || [Stage::Vehicle, Stage::Wheel]
+                .into_iter()
+                .any(|stage| mechanism.acts_at(stage))
+    };
+    tyre.contact.is_some()
+        || tyre.rolling_moment.is_some()
+        || tyre.read_off.is_some()
+        || model.terms.iter().any(|term| moves(term.entry))
+}
+
+/// Rows beside the tyre's state.
+fn rows_beside<T: Listed>(
+    catalogue: &Catalogue,
+    model: &Model,
+    p: &[T],
+    series: &Series,
+    context: &Context,
+    state: State<T>,
+) -> Rows<T> {
     let acting = |stage: Stage| acting(catalogue, model, p, series, context, stage);
     let force = Force::new(series, &state);
     let wheel = match (&series.torque, series.wheel_balance.is_empty()) {
@@ -77,15 +154,8 @@ pub fn rows<T: Listed>(
     } else {
         vehicle(series, context, &force, &acting(Stage::Vehicle))
     };
-    let mut tyre = state.force;
-    if series.tyre.is_empty() {
-        tyre.clear();
-    }
-    for (f, y) in tyre.iter_mut().zip(&series.drag) {
-        *f = -*f + *y;
-    }
     Rows {
-        tyre,
+        tyre: tyre_row(series, state.force),
         wheel,
         vehicle,
     }

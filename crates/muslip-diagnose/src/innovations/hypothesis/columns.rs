@@ -1,10 +1,11 @@
 //! A model's parameters and its columns: what of it is fitted, in which bounds, and with which products.
 
+use super::filtered::Noise;
 use crate::data::Data;
 use crate::innovations::candidates::{Table, table};
 use crate::innovations::dependence::{Dependence, width};
 use crate::innovations::gram::{Gram, grams};
-use crate::innovations::noise::{BalanceParts, Slopes};
+use crate::innovations::noise::Slopes;
 use crate::mechanism::Residuals;
 use crate::model::{Model, TYRE_BASE};
 
@@ -37,26 +38,37 @@ pub fn table_of(data: &Data, model: &Model, slopes: &Slopes, extra: &[Dependence
     table(data, model, slopes, &none, extra, &[], &|_| false)
 }
 
-/// Inner products of all columns of a table under this noise, summed over the balances, by run and half.
+/// Inner products of all columns of a table under this noise, by balance, run and half.
 #[must_use]
-pub fn table_grams(data: &Data, parts: &[BalanceParts], table: &Table) -> Vec<[Gram; 2]> {
+pub fn grams_by_balance(noise: &Noise, table: &Table) -> Vec<Vec<[Gram; 2]>> {
+    let balances = noise.balances();
+    balances
+        .map(|(part, filters)| grams(filters, &table.columns[part.balance as usize]))
+        .collect()
+}
+
+/// The sum over the balances, by run and half.
+#[must_use]
+pub fn over_balances(data: &Data, table: &Table, by_balance: &[Vec<[Gram; 2]>]) -> Vec<[Gram; 2]> {
     let width = 1
         + table.base
         + table.nuisances.len()
         + table.candidates.last().map_or(0, |c| c.columns.end);
     let mut by_run = vec![[Gram::empty(width), Gram::empty(width)]; data.series.len()];
-    for part in parts {
-        for (into, own) in
-            by_run
-                .iter_mut()
-                .zip(grams(data, part, &table.columns[part.balance as usize], 1))
-        {
+    for own in by_balance {
+        for (into, own) in by_run.iter_mut().zip(own) {
             for (into, own) in into.iter_mut().zip(own) {
-                into.add(&own);
+                into.add(own);
             }
         }
     }
     by_run
+}
+
+/// Inner products of all columns of a table under this noise, summed over the balances, by run and half.
+#[must_use]
+pub fn table_grams(data: &Data, noise: &Noise, table: &Table) -> Vec<[Gram; 2]> {
+    over_balances(data, table, &grams_by_balance(noise, table))
 }
 
 /// Columns whose coefficients are at their best wherever the model stands: free dependences and the chain's nuisances.

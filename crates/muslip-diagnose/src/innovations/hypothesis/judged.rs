@@ -1,11 +1,15 @@
 //! A model at its best, and what it says of every run.
 
+use std::sync::Arc;
+
 use nalgebra::{DMatrix, DVector};
 
 use super::columns::{own_parameters, table_grams, table_of};
+use super::filtered::Noise;
 use super::unseen::{Unseen, unseen};
 use crate::correction::Levers;
 use crate::data::Data;
+use crate::innovations::candidates::Table;
 use crate::innovations::dependence::Dependence;
 use crate::innovations::gram::Gram;
 use crate::innovations::noise::{BalanceParts, Slopes};
@@ -39,16 +43,29 @@ pub struct Judged {
     pub left: DVector<f64>,
     /// Covariance of base and terms' parameters, in the model's order.
     pub covariance: DMatrix<f64>,
+    /// Its columns, as long as more is to be asked of them.
+    pub(super) table: Option<Arc<Table>>,
 }
 
 impl Judged {
     /// What it says of unseen runs where this were the noise.
     #[must_use]
-    pub fn unseen_under(&self, data: &Data, noise: &[BalanceParts]) -> Option<Unseen> {
-        let slopes = Slopes::new(data, &self.model);
-        let table = table_of(data, &self.model, &slopes, &self.extra);
+    pub fn unseen_under(&self, data: &Data, noise: &Noise) -> Option<Unseen> {
+        let table = self.table.clone().unwrap_or_else(|| {
+            let slopes = Slopes::new(data, &self.model);
+            Arc::new(table_of(data, &self.model, &slopes, &self.extra))
+        });
         let grams = table_grams(data, noise, &table);
         unseen(data, &self.model, &table, &grams)
+    }
+
+    /// The same without its columns, which take much room.
+    #[must_use]
+    pub fn without_columns(self) -> Self {
+        Self {
+            table: None,
+            ..self
+        }
     }
 
     /// Coefficients of each free dependence.

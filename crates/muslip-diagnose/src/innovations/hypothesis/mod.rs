@@ -2,6 +2,7 @@
 //! with it, so that two models are compared each at its own best.
 
 mod columns;
+mod filtered;
 mod judged;
 mod place;
 mod sizes;
@@ -10,6 +11,7 @@ mod unseen;
 use place::{Known, Place};
 
 pub use columns::table_grams;
+pub use filtered::Noise;
 pub use judged::Judged;
 pub use sizes::{Effort, capped, noise_stride};
 pub use unseen::Unseen;
@@ -29,9 +31,28 @@ pub enum Guess<'a> {
     /// As fitted to another model, to be compared with this one: by what the noise enters is held, for likelihoods are
     /// of one noise or of none. A force that changes with the model would buy or sell readings by their noise.
     Under(&'a Judged),
-    /// The same where that model lacks the last term or dependence and nothing else: then the noise of a balance that
-    /// this one does not touch stays what it is.
-    Beside(&'a Judged),
+}
+
+/// A model that others are judged beside: they have one term or dependence more, and are held under its noise.
+pub struct Beside {
+    /// Its loss in nats.
+    pub loss: f64,
+    /// Its noise as fitted.
+    pub fitted: Noise,
+    /// The same no larger than the sensors make plausible.
+    pub at_sensors: Noise,
+}
+
+impl Beside {
+    /// Of a judged model.
+    #[must_use]
+    pub fn new(data: &Data, judged: &Judged) -> Self {
+        Self {
+            loss: judged.loss,
+            fitted: Noise::new(data, judged.parts.clone()),
+            at_sensors: Noise::new(data, capped(&judged.parts)),
+        }
+    }
 }
 
 /// Fits and judges a model from this start under a first guess of the noise.
@@ -43,17 +64,16 @@ pub fn judge(
     guess: Guess<'_>,
     effort: Effort,
 ) -> Option<Judged> {
+    let held;
     let known = match guess {
         Guess::None => Known::Nothing(effort),
         Guess::Sizes(parts) => Known::Sizes(parts),
-        Guess::Under(other) | Guess::Beside(other) => Known::Noise(&other.parts),
+        Guess::Under(other) => {
+            held = Noise::new(data, other.parts.clone());
+            Known::Noise(&held)
+        }
     };
-    let added = matches!(guess, Guess::Beside(_));
-    Place::new(data, start.clone(), extra, known)?
-        .descended(data, extra, effort.steps)?
-        .refitted(data, extra, effort, added)?
-        .descended(data, extra, effort.steps.div_ceil(2))?
-        .judged(data, extra)
+    Place::new(data, start.clone(), extra, known)?.at_its_best(data, extra, effort, false)
 }
 
 /// Judges a model to which something is added. Noise that was fitted without it may have swallowed it: its parameters are
@@ -64,28 +84,22 @@ pub fn judge_added(
     data: &Data,
     start: &Model,
     extra: &[Dependence],
-    so_far: &Judged,
+    beside: &Beside,
     effort: Effort,
 ) -> Option<Judged> {
-    let at_sensors = capped(&so_far.parts);
-    let sought = Place::new(data, start.clone(), extra, Known::Noise(&at_sensors))
+    let place = |noise| Place::new(data, start.clone(), extra, Known::Noise(noise));
+    let judged = |place: Place| place.at_its_best(data, extra, effort, true);
+    let sought = place(&beside.at_sensors)
         .and_then(|place| place.descended(data, extra, effort.steps))
-        .and_then(|place| {
-            judge(
-                data,
-                &place.into_model(),
-                extra,
-                Guess::Beside(so_far),
-                effort,
-            )
-        });
+        .and_then(|place| place.under(data, &beside.fitted))
+        .and_then(judged);
     if sought
         .as_ref()
-        .is_some_and(|found| found.loss < so_far.loss)
+        .is_some_and(|found| found.loss < beside.loss)
     {
         return sought;
     }
-    let plain = judge(data, start, extra, Guess::Beside(so_far), effort);
+    let plain = place(&beside.fitted).and_then(judged);
     match (sought, plain) {
         (Some(a), Some(b)) => Some(if a.loss < b.loss { a } else { b }),
         (a, b) => a.or(b),
@@ -113,6 +127,7 @@ mod tests {
             let guess = Guess::Sizes(&base.parts);
             base = judge(&data, &base.model, &[], guess, effort).unwrap();
         }
+        let beside = Beside::new(&data, &base);
         let mut tried = 0;
         for (entry, mechanism) in data.catalogue.entries().iter().enumerate() {
             let nothing = match mechanism.id() {
@@ -126,7 +141,7 @@ mod tests {
                 entry,
                 parameters: nothing,
             });
-            let Some(with) = judge_added(&data, &model, &[], &base, effort) else {
+            let Some(with) = judge_added(&data, &model, &[], &beside, effort) else {
                 continue;
             };
             tried += 1;

@@ -1,8 +1,13 @@
 //! A model at one place of its parameters, and the way to the best one.
 
+use std::sync::Arc;
+
 use nalgebra::DVector;
 
-use super::columns::{added_columns, bounds, linear, own_parameters, table_grams, table_of};
+use super::columns::{
+    added_columns, bounds, grams_by_balance, linear, over_balances, own_parameters, table_of,
+};
+use super::filtered::Noise;
 use super::judged::Judged;
 use super::sizes::{Effort, SWEEPS, fit_in_turn, touches, with_sizes};
 use super::unseen::unseen;
@@ -22,8 +27,11 @@ const SMALL_GAIN: f64 = 0.2;
 /// A model at one place of its parameters under noise of some sizes.
 pub struct Place {
     model: Model,
-    noise: Vec<BalanceParts>,
+    noise: Noise,
     table: Table,
+    /// Inner products by balance, run and half.
+    by_balance: Vec<Vec<[Gram; 2]>>,
+    /// Their sum over the balances.
     grams: Vec<[Gram; 2]>,
     sum: Gram,
     /// With all columns: where the linear model would go from here.
@@ -42,25 +50,41 @@ pub enum Known<'a> {
     /// Its sizes; by what it enters is the model's own.
     Sizes(&'a [BalanceParts]),
     /// Its sizes and by what it enters.
-    Noise(&'a [BalanceParts]),
+    Noise(&'a Noise),
 }
 
 impl Place {
     pub fn new(data: &Data, model: Model, extra: &[Dependence], known: Known<'_>) -> Option<Self> {
         let slopes = Slopes::new(data, &model);
         let mut noise = match known {
-            Known::Nothing(_) => parts(data, &slopes),
-            Known::Sizes(old) => with_sizes(parts(data, &slopes), old),
-            Known::Noise(old) => old.to_vec(),
+            Known::Nothing(_) => Noise::new(data, parts(data, &slopes)),
+            Known::Sizes(old) => Noise::new(data, with_sizes(parts(data, &slopes), old)),
+            Known::Noise(old) => old.clone(),
         };
         let table = table_of(data, &model, &slopes, extra);
+        let mut by_balance = grams_by_balance(&noise, &table);
         if let Known::Nothing(effort) = known {
             for _ in 0..SWEEPS {
-                fit_in_turn(data, &table, &mut noise, &|_| true, false, effort);
+                let all = &|_: Balance| true;
+                let own = &mut by_balance;
+                fit_in_turn(data, &table, &mut noise, own, all, false, effort);
             }
         }
+        let held = matches!(known, Known::Noise(_));
+        Self::at(data, model, table, noise, by_balance, held)
+    }
+
+    /// The model with its table and what the noise makes of that.
+    fn at(
+        data: &Data,
+        model: Model,
+        table: Table,
+        noise: Noise,
+        by_balance: Vec<Vec<[Gram; 2]>>,
+        held: bool,
+    ) -> Option<Self> {
         let prior = |i: usize| precision(&table, i);
-        let grams = table_grams(data, &noise, &table);
+        let grams = over_balances(data, &table, &by_balance);
         let sum = total(&grams);
         let chosen: Vec<usize> = (1..sum.products.nrows()).collect();
         let solved = solve(&sum.products, &chosen, &prior)?;
@@ -69,11 +93,12 @@ impl Place {
             model,
             noise,
             table,
+            by_balance,
             grams,
             sum,
             solved,
             here,
-            held: matches!(known, Known::Noise(_)),
+            held,
         })
     }
 
@@ -82,9 +107,22 @@ impl Place {
         let known = if self.held {
             Known::Noise(&self.noise)
         } else {
-            Known::Sizes(&self.noise)
+            Known::Sizes(self.noise.parts())
         };
         Self::new(data, model, extra, known)
+    }
+
+    /// The same place under another model's noise.
+    pub fn under(self, data: &Data, noise: &Noise) -> Option<Self> {
+        let by_balance = grams_by_balance(noise, &self.table);
+        Self::at(
+            data,
+            self.model,
+            self.table,
+            noise.clone(),
+            by_balance,
+            true,
+        )
     }
 
     /// Nats that the linear model would still gain.
@@ -92,8 +130,8 @@ impl Place {
         0.5 * (self.here - self.solved.rss - self.sum.log_variance)
     }
 
-    /// The same place with the noise fitted to it.
-    pub fn refitted(
+    /// The same place with the noise fitted to it: its columns, and by what the noise enters, stay what they are.
+    fn refitted(
         mut self,
         data: &Data,
         extra: &[Dependence],
@@ -104,8 +142,10 @@ impl Place {
         let touched = |balance: Balance| {
             !added || touches(&self.table.columns[balance as usize], columns.clone())
         };
-        fit_in_turn(data, &self.table, &mut self.noise, &touched, true, effort);
-        self.another(data, self.model.clone(), extra)
+        let (noise, own) = (&mut self.noise, &mut self.by_balance);
+        fit_in_turn(data, &self.table, noise, own, &touched, true, effort);
+        let (noise, own) = (self.noise, self.by_balance);
+        Self::at(data, self.model, self.table, noise, own, self.held)
     }
 
     /// At most so many steps towards the best parameters, none uphill.
@@ -128,11 +168,6 @@ impl Place {
         Some(place)
     }
 
-    /// The model.
-    pub fn into_model(self) -> Model {
-        self.model
-    }
-
     fn stepped(&self, data: &Data, shrink: f64) -> Model {
         let bounds = bounds(data, &self.model);
         let own = own_parameters(&self.model);
@@ -152,8 +187,23 @@ impl Place {
         self.model.with(&p)
     }
 
+    /// What is to be said of the model once its parameters, then the noise, then its parameters again are at their
+    /// best. `added` is whether only the noise of balances that its last term touches may change.
+    pub fn at_its_best(
+        self,
+        data: &Data,
+        extra: &[Dependence],
+        effort: Effort,
+        added: bool,
+    ) -> Option<Judged> {
+        self.descended(data, extra, effort.steps)?
+            .refitted(data, extra, effort, added)?
+            .descended(data, extra, effort.steps.div_ceil(2))?
+            .judged(data, extra)
+    }
+
     /// What is to be said of the model here.
-    pub fn judged(self, data: &Data, extra: &[Dependence]) -> Option<Judged> {
+    fn judged(self, data: &Data, extra: &[Dependence]) -> Option<Judged> {
         let prior = |i: usize| precision(&self.table, i);
         let n = self.sum.products.nrows();
         // Free dependences are linear: at their best here.
@@ -163,7 +213,7 @@ impl Place {
         for (at, &i) in linear.iter().enumerate() {
             coefficients[i - 1] = best.coefficients[at];
         }
-        let penalty: f64 = self.noise.iter().map(estimate::penalty).sum();
+        let penalty: f64 = self.noise.parts().iter().map(estimate::penalty).sum();
         let k = own_parameters(&self.model).len();
         Some(Judged {
             loss: 0.5 * (self.sum.log_variance + best.rss) + penalty,
@@ -174,8 +224,9 @@ impl Place {
             prior: (0..n).map(prior).collect(),
             left: coefficients.clone(),
             unseen: unseen(data, &self.model, &self.table, &self.grams)?,
+            table: Some(Arc::new(self.table)),
             model: self.model,
-            parts: self.noise,
+            parts: self.noise.into_parts(),
             grams: self.grams,
         })
     }

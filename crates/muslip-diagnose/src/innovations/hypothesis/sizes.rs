@@ -2,10 +2,11 @@
 
 use nalgebra::DMatrix;
 
+use super::filtered::Noise;
 use crate::data::Data;
 use crate::innovations::candidates::Table;
 use crate::innovations::estimate::{self, Readings};
-use crate::innovations::gram::{Columns, grams, total};
+use crate::innovations::gram::{Columns, Gram, grams, total};
 use crate::innovations::noise::BalanceParts;
 use crate::innovations::screen::precision;
 use crate::mechanism::Balance;
@@ -58,23 +59,23 @@ pub fn with_sizes(mut fresh: Vec<BalanceParts>, old: &[BalanceParts]) -> Vec<Bal
 /// How often the noise of every balance is fitted in turn where nothing is known of any.
 pub const SWEEPS: usize = 2;
 
-/// Fits the noise of one balance after the other, by the likelihood of all: they share the coefficients. `carried` is
-/// whether it was fitted to another model.
+/// Fits the noise of one balance after the other, by the likelihood of all: they share the coefficients. `by_balance`
+/// are the inner products of the table's columns under the noise as it is, and then as fitted; `carried` is whether it
+/// was fitted to another model.
 pub fn fit_in_turn(
     data: &Data,
     table: &Table,
-    noise: &mut [BalanceParts],
+    noise: &mut Noise,
+    by_balance: &mut [Vec<[Gram; 2]>],
     touched: &dyn Fn(Balance) -> bool,
     carried: bool,
     effort: Effort,
 ) {
     let prior = |i: usize| precision(table, i);
-    let own = |part: &BalanceParts| {
-        total(&grams(data, part, &table.columns[part.balance as usize], 1)).products
-    };
-    let mut products: Vec<DMatrix<f64>> = noise.iter().map(own).collect();
-    for at in 0..noise.len() {
-        let part = &mut noise[at];
+    let mut products: Vec<DMatrix<f64>> =
+        by_balance.iter().map(|own| total(own).products).collect();
+    for at in 0..products.len() {
+        let mut part = noise.parts()[at].clone();
         if !touched(part.balance) {
             continue;
         }
@@ -82,19 +83,22 @@ pub fn fit_in_turn(
         for (_, own) in products.iter().enumerate().filter(|(i, _)| *i != at) {
             others += own;
         }
+        let columns = &table.columns[part.balance as usize];
         let readings = Readings {
             data,
-            columns: &table.columns[part.balance as usize],
+            columns,
             precision: &prior,
             others: &others,
             stride: effort.noise_stride,
         };
         if carried {
-            fit_from_both(&readings, part, effort.noise_steps);
+            fit_from_both(&readings, &mut part, effort.noise_steps);
         } else {
-            estimate::fit(&readings, part, effort.noise_steps);
+            estimate::fit(&readings, &mut part, effort.noise_steps);
         }
-        products[at] = own(part);
+        noise.replace(data, at, part);
+        by_balance[at] = grams(noise.filters(at), columns);
+        products[at] = total(&by_balance[at]).products;
     }
 }
 
@@ -110,11 +114,14 @@ pub fn touches(columns: &[Columns], which: core::ops::Range<usize>) -> bool {
 /// sensors' own as well: what swallowed an effect before it was in the model must be let go of.
 fn fit_from_both(readings: &Readings<'_>, part: &mut BalanceParts, steps: usize) {
     let mut anew = part.clone();
-    let carried_on = estimate::fit(readings, part, steps);
     for source in &mut anew.sources {
         source.log_std = source.log_start;
     }
-    if estimate::fit(readings, &mut anew, steps) < carried_on {
+    let (carried_on, afresh) = rayon::join(
+        || estimate::fit(readings, part, steps),
+        || estimate::fit(readings, &mut anew, steps),
+    );
+    if afresh < carried_on {
         *part = anew;
     }
 }

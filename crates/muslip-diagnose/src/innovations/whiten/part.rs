@@ -52,10 +52,10 @@ impl Pair {
         })
     }
 
-    /// What a unit of variance adds over a step, to the first part, the second and what they share.
+    /// What a unit of variance adds over a step that keeps so much of the first part and of the second, to the first,
+    /// the second and what they share.
     #[inline(always)]
-    pub fn driven(&self, start: f64, decay: &[f64; MOST]) -> [f64; 3] {
-        let (a, b) = (decay[self.at], decay[TWIN]);
+    pub fn driven(&self, start: f64, a: f64, b: f64) -> [f64; 3] {
         let [first, second, shared] = self.variances;
         [
             first * (start + 1.0 - a * a),

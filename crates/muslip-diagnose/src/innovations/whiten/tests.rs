@@ -107,9 +107,41 @@ fn dense(time: &[f64], segments: &[core::ops::Range<usize>], parts: &[Part<'_>])
     covariance
 }
 
+/// The filter on one run, and columns through it.
+struct Filter {
+    own: Whitener,
+}
+
+impl Filter {
+    fn new(
+        time: &[f64],
+        segments: &[core::ops::Range<usize>],
+        white: f64,
+        diffuse: f64,
+        parts: &[Part<'_>],
+    ) -> Self {
+        let course = Arc::new(Course::new(time, segments, 1, parts));
+        let sizes = Sizes {
+            white,
+            diffuse,
+            parts: core::array::from_fn(|i| parts.get(i).map_or(0.0, |part| part.std)),
+        };
+        // A shorter run beside it, which ends before.
+        let shorter = Arc::new(Course::new(time, &segments[..2], 1, parts));
+        let mut all = whiteners(&[Some(shorter), None, Some(course)], &sizes);
+        Self {
+            own: all.pop().flatten().unwrap(),
+        }
+    }
+
+    fn apply(&self, columns: &[&[f64]]) -> Lanes {
+        self.own.apply(&Lanes::of(columns, self.own.samples()))
+    }
+}
+
 fn worst_difference(parts: &[Part<'_>], time: &[f64], draw: &mut ChaCha8Rng) -> f64 {
     let segments = [2..30, 34..45, 45..80];
-    let whitener = Whitener::new(time, &segments, 1, WHITE, WHITE * WHITE * DIFFUSE, parts);
+    let whitener = Filter::new(time, &segments, WHITE, WHITE * WHITE * DIFFUSE, parts);
     let covariance = dense(time, &segments, parts);
     let factor = covariance.clone().cholesky().unwrap();
     let columns: Vec<Vec<f64>> = (0..11)
@@ -118,21 +150,19 @@ fn worst_difference(parts: &[Part<'_>], time: &[f64], draw: &mut ChaCha8Rng) -> 
     let refs: Vec<&[f64]> = columns.iter().map(Vec::as_slice).collect();
     let white = whitener.apply(&refs);
     let mut worst = 0.0f64;
-    for (a, own) in columns.iter().zip(&white) {
-        for (b, other) in columns.iter().zip(&white) {
-            let pick = |x: &[f64]| {
-                DVector::from_iterator(
-                    whitener.samples.len(),
-                    whitener.samples.iter().map(|k| x[*k]),
-                )
-            };
+    let samples = whitener.own.samples();
+    let products = white.products(0, samples.len());
+    for (i, a) in columns.iter().enumerate() {
+        for (j, b) in columns.iter().enumerate() {
+            let pick =
+                |x: &[f64]| DVector::from_iterator(samples.len(), samples.iter().map(|k| x[*k]));
             let expected = pick(a).dot(&factor.solve(&pick(b)));
-            let found: f64 = own.iter().zip(other).map(|(a, b)| a * b).sum();
+            let found = products[(i, j)];
             worst = worst.max((found - expected).abs() / expected.abs().max(1.0));
         }
     }
     let log_det = 2.0 * factor.l().diagonal().iter().map(|d| d.ln()).sum::<f64>();
-    worst.max((whitener.log_variances.iter().sum::<f64>() - log_det).abs() / log_det.abs())
+    worst.max((whitener.own.log_variances().iter().sum::<f64>() - log_det).abs() / log_det.abs())
 }
 
 fn part(kind: Kind, std: f64, gain: &[f64]) -> Part<'_> {
@@ -201,10 +231,9 @@ fn slopes_of_the_likelihood_are_its_differences() {
             .collect::<Vec<_>>()
     };
     let filter = |variances: &[f64; 7]| {
-        Whitener::new(
+        Filter::new(
             &time,
             &segments,
-            1,
             variances[6].sqrt(),
             1e6,
             &parts(&variances[..6]),
@@ -212,15 +241,24 @@ fn slopes_of_the_likelihood_are_its_differences() {
     };
     let value = |variances: &[f64; 7]| {
         let whitener = filter(variances);
-        let squares: f64 = whitener.apply(&refs).iter().flatten().map(|x| x * x).sum();
-        whitener.log_variances.iter().sum::<f64>() + squares
+        let products = whitener
+            .apply(&refs)
+            .products(0, whitener.own.samples().len());
+        let squares = products.trace();
+        whitener.own.log_variances().iter().sum::<f64>() + squares
     };
     let here = [0.4, 0.6, 2.0, 1.2, 0.8, 0.7, 0.5];
     let whitener = filter(&here);
-    let traces = whitener.traces(&parts(&here[..6]));
-    let white = whitener.apply(&refs);
-    let white: Vec<&[f64]> = white.iter().map(Vec::as_slice).collect();
-    let squares = whitener.squares(&white, &parts(&here[..6]));
+    let traces = traces(&[&whitener.own])[0];
+    // Sums of columns that a rotation makes explain together what the columns do.
+    let rotation = DMatrix::from_fn(11, 11, |_, _| draw.random_range(-1.0..1.0))
+        .qr()
+        .q();
+    let [some, last] = whitener.own.explained(&whitener.apply(&refs), &rotation);
+    let squares = ByVariance {
+        parts: core::array::from_fn(|i| some.parts[i] + last.parts[i]),
+        white: some.white + last.white,
+    };
     for i in 0..7 {
         let own = if i == 6 {
             traces.white - squares.white

@@ -1,0 +1,154 @@
+//! The passes of columns: forward to their innovations, back to what the parts explain of them.
+
+use pulp::{Simd, WithSimd};
+
+use crate::innovations::whiten::lanes::{LANES, Lane};
+use crate::innovations::whiten::part::{MOST, TWIN};
+use crate::innovations::whiten::{ByVariance, Whitener};
+
+/// States of `G` groups of columns.
+type States<const G: usize> = [[Lane; G]; MOST];
+
+/// The pass of [`Whitener::apply`] for `G` of the groups of columns.
+pub struct Apply<'a, const G: usize> {
+    pub whitener: &'a Whitener,
+    /// Columns and innovations, reading by reading.
+    pub columns: &'a [Lane],
+    pub out: &'a mut [Lane],
+    /// Groups a reading, and the first of these.
+    pub groups: usize,
+    pub first: usize,
+}
+
+impl<const G: usize> WithSimd for Apply<'_, G> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _simd: S) -> Self::Output {
+        let Whitener { course, found } = self.whitener;
+        let readings = self.columns.chunks_exact(self.groups);
+        let out = self.out.chunks_exact_mut(self.groups);
+        let gains = found.gains.iter().zip(&found.inverse);
+        let mut x: States<G> = [[[0.0; LANES]; G]; MOST];
+        for (((step, (gain, inverse)), column), out) in
+            course.steps.iter().zip(gains).zip(readings).zip(out)
+        {
+            for i in 1..MOST {
+                if course.integrated[i] != 0.0 {
+                    for g in 0..G {
+                        for l in 0..LANES {
+                            x[0][g][l] += step.dt * x[i][g][l];
+                        }
+                    }
+                }
+            }
+            let decay = course.decay_of(step);
+            let mut e: [Lane; G] = core::array::from_fn(|g| column[self.first + g]);
+            for i in 0..MOST {
+                for g in 0..G {
+                    for l in 0..LANES {
+                        x[i][g][l] *= decay[i];
+                        e[g][l] -= step.row[i] * x[i][g][l];
+                    }
+                }
+            }
+            for i in 0..MOST {
+                for g in 0..G {
+                    for l in 0..LANES {
+                        x[i][g][l] += gain[i] * e[g][l];
+                    }
+                }
+            }
+            for g in 0..G {
+                out[self.first + g] = e[g].map(|e| e * inverse);
+            }
+        }
+    }
+}
+
+/// The pass back of [`Whitener::explained`] for one group of sums of columns. `LAST` is whether the last lane holds a sum
+/// that is told apart.
+pub struct Squares<'a, const LAST: bool> {
+    pub whitener: &'a Whitener,
+    /// Innovations of the sums, reading by reading.
+    pub sums: &'a [Lane],
+    /// Groups a reading, and this one.
+    pub groups: usize,
+    pub group: usize,
+    /// Of all lanes but one that is told apart, and of that.
+    pub out: &'a mut [ByVariance; 2],
+}
+
+/// Sum over the lanes but for the last where that is told apart, and the last.
+#[inline(always)]
+fn across<const LAST: bool>(lane: &Lane) -> [f64; 2] {
+    let count = if LAST { LANES - 1 } else { LANES };
+    let mut sum = lane[0];
+    for own in &lane[1..count] {
+        sum += own;
+    }
+    [sum, lane[LANES - 1]]
+}
+
+/// Products lane by lane.
+#[inline(always)]
+fn times(a: &Lane, b: &Lane) -> Lane {
+    core::array::from_fn(|l| a[l] * b[l])
+}
+
+impl<const LAST: bool> WithSimd for Squares<'_, LAST> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _simd: S) -> Self::Output {
+        let Whitener { course, found } = self.whitener;
+        let (groups, group, out) = (self.groups, self.group, self.out);
+        let mut s = [[0.0; LANES]; MOST];
+        for (at, step) in course.steps.iter().enumerate().rev() {
+            let (gain, inverse) = (&found.gains[at], found.inverse[at]);
+            let mut u = self.sums[at * groups + group].map(|white| white * inverse);
+            for i in 0..MOST {
+                for l in 0..LANES {
+                    u[l] -= gain[i] * s[i][l];
+                }
+            }
+            let [rest, last] = across::<LAST>(&times(&u, &u));
+            out[0].white += rest;
+            if LAST {
+                out[1].white += last;
+            }
+            for i in 0..MOST {
+                for l in 0..LANES {
+                    s[i][l] += step.row[i] * u[l];
+                }
+            }
+            if step.fresh {
+                s[0] = [0.0; LANES];
+            }
+            let driven = course.driven(at, step);
+            for i in 0..MOST {
+                let [rest, last] = across::<LAST>(&times(&s[i], &s[i]));
+                out[0].parts[i] += rest * driven[i];
+                if LAST {
+                    out[1].parts[i] += last * driven[i];
+                }
+            }
+            if let Some(pair) = &course.filtered {
+                let together = course.driven_together(at, step);
+                let [rest, last] = across::<LAST>(&times(&s[pair.at], &s[TWIN]));
+                out[0].parts[pair.at] += rest * together;
+                if LAST {
+                    out[1].parts[pair.at] += last * together;
+                }
+            }
+            let decay = course.decay_of(step);
+            let level = s[0];
+            for i in 0..MOST {
+                let along = course.integrated[i] * step.dt;
+                for l in 0..LANES {
+                    s[i][l] = s[i][l] * decay[i] + along * level[l];
+                }
+            }
+        }
+    }
+}
