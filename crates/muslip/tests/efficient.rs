@@ -125,6 +125,27 @@ fn after_ten_thousand_samples_it_is_where_the_batch_fit_is() {
 }
 
 #[test]
+fn a_hundred_thousand_samples_are_counted_without_an_overflow_and_estimated() {
+    // A hundred seconds at 1 kHz: more than sixteen bits count.
+    let slips: Vec<f64> = (0..100_000)
+        .map(|k| 0.3 * f64::from(k % 500) / 500.0)
+        .collect();
+    let points = points(0.9, 0.12, &slips, 5);
+    let mut filter = Config::for_range(Range::Automotive).build().unwrap();
+    run(&mut filter, &points, SIGMA);
+    let (mup, sp) = maximum_likelihood(&points);
+    let peak = filter.peak();
+    let (off_mup, off_sp) = (
+        (f64::from(peak.peak_friction) - mup) / f64::from(peak.peak_friction_std),
+        (f64::from(peak.critical_slip) - sp) / f64::from(peak.critical_slip_std),
+    );
+    assert!(
+        off_mup.abs() < 0.5 && off_sp.abs() < 0.5,
+        "{off_mup} {off_sp}"
+    );
+}
+
+#[test]
 fn its_memory_is_fixed_and_small() {
     assert!(
         size_of::<EfficientFilter<f32>>() <= 512,

@@ -177,7 +177,7 @@ impl<T: Real> Estimate<T> {
                 None if factor > T::from_f64(CONTAMINATED_FACTOR) => {
                     (self.seen / 4 + 1).min(MOST_SAMPLES_BETWEEN)
                 }
-                None => (self.seen + 1).min(MOST_SAMPLES_BETWEEN),
+                None => self.seen.min(MOST_SAMPLES_BETWEEN - 1) + 1,
             };
             self.seen = self.seen.saturating_add(next);
         }
