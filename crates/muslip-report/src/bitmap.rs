@@ -18,8 +18,11 @@ pub(super) fn png(svg: &str) -> Result<Vec<u8>, String> {
         return Err("a view box has four numbers".into());
     };
     let scale = PIXELS_PER_UNIT * number(root, "width")? / width;
-    let mut pixels = Pixmap::new((width * scale).ceil() as u32, (height * scale).ceil() as u32)
-        .ok_or("no room for the picture")?;
+    let mut pixels = Pixmap::new(
+        (width * scale).ceil() as u32,
+        (height * scale).ceil() as u32,
+    )
+    .ok_or("no room for the picture")?;
     pixels.fill(Color::WHITE);
     let face = Face::parse(FONT, 0).map_err(|error| error.to_string())?;
     for element in root.children().filter(Node::is_element) {
