@@ -59,7 +59,11 @@ fn draw(element: Node<'_, '_>, face: &Face<'_>, scale: f32, to: &mut Pixmap) -> 
     }
     if let Some(paint) = paint(element, "stroke")? {
         let stroke = Stroke {
-            width: number(element, "stroke-width")?,
+            width: if element.has_attribute("stroke-width") {
+                number(element, "stroke-width")?
+            } else {
+                1.0
+            },
             ..Stroke::default()
         };
         to.stroke_path(&path, &paint, &stroke, transform, None);
@@ -213,4 +217,37 @@ fn numbers(element: Node<'_, '_>, name: &str) -> Result<Vec<f32>, String> {
         .filter(|part| !part.is_empty())
         .map(|part| part.parse().map_err(|_| format!("{name}: {part}")))
         .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use tiny_skia::Pixmap;
+
+    use super::png;
+
+    fn drawn(element: &str) -> Result<Vec<u8>, String> {
+        png(&format!(
+            "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"8\" viewBox=\"0 0 8 8\">{element}</svg>"
+        ))
+    }
+
+    #[test]
+    fn a_stroke_of_no_stated_width_is_one_unit_wide() {
+        let frame = "<rect x=\"2\" y=\"2\" width=\"4\" height=\"4\" opacity=\"1\" fill=\"none\" \
+                     stroke=\"#C8281E\"/>";
+        let pixels = Pixmap::decode_png(&drawn(frame).unwrap()).unwrap();
+        let inked = |x, y| pixels.pixel(x, y).unwrap().green() == 0x28;
+        assert!(inked(3, 8) && inked(4, 8) && !inked(2, 8) && !inked(5, 8));
+    }
+
+    #[test]
+    fn what_is_not_understood_is_an_error_and_not_left_out() {
+        assert!(
+            drawn("<ellipse cx=\"1\"/>")
+                .unwrap_err()
+                .contains("ellipse")
+        );
+        let line = "<line x1=\"0\" y1=\"0\" x2=\"4\" y2=\"4\" opacity=\"1\" stroke=\"red\"/>";
+        assert!(drawn(line).unwrap_err().contains("red"));
+    }
 }
