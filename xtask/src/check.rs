@@ -7,55 +7,34 @@ use crate::step::{cargo, run};
 /// Runs the three; the first that fails ends it.
 pub fn run_all() -> Result<()> {
     run("formatting", cargo(&["fmt", "--all", "--check"]))?;
-    run(
-        "clippy",
-        cargo(&[
-            "clippy",
-            "--workspace",
-            "--all-targets",
-            "--locked",
-            "--",
-            "-D",
-            "warnings",
-        ]),
-    )?;
-    run(
+    clippy("clippy", &["--workspace", "--all-targets"])?;
+    clippy(
         "clippy of the features",
-        cargo(&[
-            "clippy",
-            "--package",
-            "muslip",
-            "--package",
-            "muslip-laws",
-            "--package",
-            "muslip-quarter-car",
-            "--package",
-            "muslip-compensate",
+        &[
+            "--package=muslip",
+            "--package=muslip-laws",
+            "--package=muslip-quarter-car",
+            "--package=muslip-compensate",
             "--all-features",
-            "--locked",
-            "--",
-            "-D",
-            "warnings",
-        ]),
+        ],
     )?;
-    run(
+    clippy(
         "clippy of the firmware's image",
-        cargo(&[
-            "clippy",
-            "--package",
-            "firmware",
-            "--features",
-            "test-image",
-            "--target",
-            "thumbv7em-none-eabihf",
-            "--locked",
-            "--",
-            "-D",
-            "warnings",
-        ]),
+        &[
+            "--package=firmware",
+            "--features=test-image",
+            "--target=thumbv7em-none-eabihf",
+        ],
     )?;
     // Libraries only: the command and the core are both called muslip and would overwrite each other.
     let mut documentation = cargo(&["doc", "--workspace", "--lib", "--no-deps", "--locked"]);
     documentation.env("RUSTDOCFLAGS", "-D warnings");
     run("documentation", documentation)
+}
+
+/// Clippy with these arguments, warnings denied.
+fn clippy(name: &str, arguments: &[&str]) -> Result<()> {
+    let mut command = cargo(&["clippy", "--locked"]);
+    command.args(arguments).args(["--", "-D", "warnings"]);
+    run(name, command)
 }

@@ -125,7 +125,7 @@ fn main() -> anyhow::Result<()> {
     match Arguments::parse().command {
         Command::Test => test::run_all(),
         Command::Check => check::run_all(),
-        Command::Python => python::test(),
+        Command::Python => python::test_alone(),
         Command::Formats { mutations } => formats::test(mutations),
         Command::Firmware => firmware::budgets(),
         Command::Pil {

@@ -7,12 +7,30 @@ use anyhow::{Context, Result, bail};
 
 use crate::setup;
 use crate::step::{CHECKED, cargo, command, root, run, target};
+use crate::trial::program;
 
 /// The environment variable that names the command to the tests.
 const COMMAND: &str = "MUSLIP_COMMAND";
 
-/// Builds the wheel, installs it into a virtual environment of its own and runs the package's tests there.
-pub fn test() -> Result<()> {
+/// As [`test`], against a command that is built for it.
+pub fn test_alone() -> Result<()> {
+    run(
+        "the command that the package is held against",
+        cargo(&[
+            "build",
+            "--package",
+            "muslip-cli",
+            "--profile",
+            CHECKED,
+            "--locked",
+        ]),
+    )?;
+    test(&program(&target(), CHECKED, "muslip"))
+}
+
+/// Builds the wheel, installs it into a virtual environment of its own and runs the package's tests there, against
+/// this command.
+pub fn test(muslip: &str) -> Result<()> {
     let python = setup::python_environment("python", &root().join("python/requirements.txt"))?;
     let python = python.to_string_lossy();
     for (name, arguments) in [
@@ -33,17 +51,6 @@ pub fn test() -> Result<()> {
             .env("MYPY_CACHE_DIR", target().join("mypy"));
         run(name, check)?;
     }
-    run(
-        "the command that the package is held against",
-        cargo(&[
-            "build",
-            "--package",
-            "muslip-cli",
-            "--profile",
-            CHECKED,
-            "--locked",
-        ]),
-    )?;
     let wheels = target().join("wheels");
     if wheels.exists() {
         fs::remove_dir_all(&wheels)?;
@@ -95,7 +102,7 @@ pub fn test() -> Result<()> {
     tests
         .arg(root().join("python/tests"))
         .current_dir(&wheels)
-        .env(COMMAND, target().join(CHECKED).join("muslip"));
+        .env(COMMAND, muslip);
     run("tests of the Python package", tests)
 }
 

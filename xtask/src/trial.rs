@@ -56,28 +56,33 @@ pub fn play(arguments: &[String]) -> Result<()> {
             "sealed-trial",
         ]),
     )?;
-    play_built(RELEASE, "muslip", &further)
+    play_built(RELEASE, &program(&target(), RELEASE, "muslip"), &further)
 }
 
 /// The small trial: continuous integration's seed, figures held by a ratchet. Of what the tests have built: their
 /// command is the same `muslip` under another name.
 pub fn small() -> Result<()> {
     let arguments = ["--small", "--seed", SMALL_SEED].map(str::to_owned);
-    play_built(CHECKED, "muslip-under-test", &arguments)
+    play_built(CHECKED, &under_test(), &arguments)
+}
+
+/// The command as the tests have built it.
+pub fn under_test() -> String {
+    program(&target(), CHECKED, "muslip-under-test")
 }
 
 /// Plays the trial with programs that are built.
 fn play_built(profile: &str, muslip: &str, arguments: &[String]) -> Result<()> {
-    let muslip = program(&target(), profile, muslip);
     let mut trial = command(
         &program(&target(), profile, "sealed-trial"),
-        &["run", "--muslip", &muslip],
+        &["run", "--muslip", muslip],
     );
     trial.args(arguments);
     run("sealed trial", trial)
 }
 
-fn program(target: &std::path::Path, profile: &str, name: &str) -> String {
+/// A program in the target folder, built in a profile.
+pub fn program(target: &std::path::Path, profile: &str, name: &str) -> String {
     target
         .join(profile)
         .join(format!("{name}{}", std::env::consts::EXE_SUFFIX))

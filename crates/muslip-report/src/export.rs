@@ -1,21 +1,13 @@
 //! The figures of a report as files for a document: SVG, or PNG drawn from it.
 
 use std::path::{Path, PathBuf};
-use std::sync::{Arc, LazyLock};
 
 use muslip_recordings::output::{OutputError, create_folder, write_file};
-use resvg::tiny_skia::{Pixmap, Transform};
-use resvg::usvg::fontdb::Database;
-use resvg::usvg::{Options, Tree};
 
+use super::bitmap::png;
 use super::figure::Figure;
 use super::page::{Block, Report, ReportError};
 use super::svg::stand_alone;
-
-/// Pixels for each unit of a figure: 1520 wide, enough for a column of print.
-const PIXELS_PER_UNIT: f32 = 2.0;
-/// The letters of a PNG, the same on every machine.
-const FONT: &[u8] = include_bytes!("../vendor/dejavu/DejaVuSans.ttf");
 
 /// How figures are written for a document.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -107,33 +99,10 @@ fn add(figures: &mut Vec<(String, Figure)>, figure: Figure) {
     figures.push((name, figure));
 }
 
-fn png(svg: &str) -> Result<Vec<u8>, String> {
-    static FONTS: LazyLock<Arc<Database>> = LazyLock::new(|| {
-        let mut fonts = Database::new();
-        fonts.load_font_data(FONT.to_vec());
-        fonts.set_sans_serif_family("DejaVu Sans");
-        Arc::new(fonts)
-    });
-    let options = Options {
-        fontdb: FONTS.clone(),
-        font_family: "DejaVu Sans".into(),
-        ..Options::default()
-    };
-    let tree = Tree::from_str(svg, &options).map_err(|error| error.to_string())?;
-    let size = tree
-        .size()
-        .to_int_size()
-        .scale_by(PIXELS_PER_UNIT)
-        .ok_or("no size")?;
-    let mut pixels = Pixmap::new(size.width(), size.height()).ok_or("no room")?;
-    pixels.fill(resvg::tiny_skia::Color::WHITE);
-    let scale = Transform::from_scale(PIXELS_PER_UNIT, PIXELS_PER_UNIT);
-    resvg::render(&tree, scale, &mut pixels.as_mut());
-    pixels.encode_png().map_err(|error| error.to_string())
-}
-
 #[cfg(test)]
 mod tests {
+    use tiny_skia::Pixmap;
+
     use super::*;
     use crate::axis::Axis;
     use crate::figure::{Ink, Shape};

@@ -30,6 +30,7 @@
 #![forbid(unsafe_code)]
 
 mod axis;
+mod bitmap;
 pub mod campaign;
 mod canvas;
 mod clip;

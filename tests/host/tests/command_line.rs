@@ -1,11 +1,9 @@
 //! The `muslip` command as a person and a script meet it: help, words, statuses, files.
 
-mod common;
-
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
-use common::{HEADER, RIG, Scratch, recording_of};
+use crate::common::{HEADER, RIG, Scratch, recording_of};
 use test_support::scenario::article;
 
 const SUBCOMMANDS: [&str; 11] = [

@@ -2,11 +2,9 @@
 //! and goes. The effects are made here by small Euler steps in the plant and on the load cell's reading,
 //! not by the core's equations.
 
-mod common;
-
 use std::collections::VecDeque;
 
-use common::{HEADER, Scratch, number, words};
+use crate::common::{HEADER, Scratch, number, words};
 use host_sim::{Brake, BrakeProgramme, Contact, Plant, PlantEffect, PlantParameters};
 use muslip_diagnose::campaign::Rig;
 use muslip_diagnose::mechanism::Context;

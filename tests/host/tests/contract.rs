@@ -1,9 +1,7 @@
 //! The contract that other programs read our files by: its words and its schema are in `docs/contract`, and what we
 //! write keeps to them.
 
-mod diagnosis;
-
-use diagnosis::{assert_valid, contract, partly_explained, shared_contract, with_chain};
+use crate::diagnosis::{assert_valid, contract, partly_explained, shared_contract, with_chain};
 use muslip_analysis::diagnose::json::{make_finite, to_text};
 use muslip_diagnose::mechanism::Id;
 use serde_json::Value;

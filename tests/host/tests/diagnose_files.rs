@@ -1,21 +1,9 @@
 //! `muslip diagnose` from files to files, the engine included.
 
-mod common;
-mod diagnosis;
-
-use common::Scratch;
-use diagnosis::{HEADER, RIG, Random, assert_valid, campaign};
+use crate::common::Scratch;
+use crate::diagnosis::{HEADER, RIG, Random, assert_valid, campaign, lagging};
 use proptest::prelude::*;
 use serde_json::Value;
-
-/// A lag of the drag channel of 10 ms, which is not in the simulation.
-fn lagging(_: u64) -> Box<dyn FnMut(f64, f64) -> f64> {
-    let mut state = 0.0;
-    Box::new(move |dt, drag| {
-        state += (drag - state) * (1.0 - (-dt / 0.010).exp());
-        state
-    })
-}
 
 fn faithful(_: u64) -> Box<dyn FnMut(f64, f64) -> f64> {
     Box::new(|_, drag| drag)

@@ -3,11 +3,9 @@
 //! What ought to come out but does not yet is in the sealed trial's table of measured recordings
 //! (`cargo xtask trial`), with its figures.
 
-mod common;
-
 use std::path::Path;
 
-use common::{Scratch, measured_data};
+use crate::common::{Scratch, measured_data};
 use serde_json::Value;
 
 fn diagnosed(folder: &Path, names: &[String]) -> Value {

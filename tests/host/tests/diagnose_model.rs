@@ -1,12 +1,9 @@
 //! `model.toml` and `muslip predict`.
 
-mod common;
-mod diagnosis;
-
 use std::path::Path;
 
-use common::Scratch;
-use diagnosis::{HEADER, RIG, campaign, repaired};
+use crate::common::Scratch;
+use crate::diagnosis::{HEADER, RIG, campaign, repaired};
 use muslip_diagnose::campaign::Run;
 use muslip_diagnose::repaired::Which;
 use muslip_recordings::model_file::{ModelFile, to_text};

@@ -1,10 +1,8 @@
 //! What the terminal, the report and the two files say of a diagnosis.
 
-mod diagnosis;
-
 use std::path::Path;
 
-use diagnosis::{assert_valid, consistent, monstrous, partly_explained, with_chain};
+use crate::diagnosis::{assert_valid, consistent, monstrous, partly_explained, with_chain};
 use muslip_analysis::diagnose::json;
 use muslip_diagnose::outcome::{BeforeAfter, Diagnosis, Fit, LookedFor, Verdict};
 use muslip_recordings::model_file;

@@ -1,13 +1,10 @@
 //! Pictures of what mechanisms do, of runs in which the model is true: simulated by the plant, whose equations the
 //! engine's balances do not share.
 
-mod common;
-mod diagnosis;
-
 use std::path::PathBuf;
 
-use common::Scratch;
-use diagnosis::{RIG, parameter, partly_explained, repaired};
+use crate::common::Scratch;
+use crate::diagnosis::{RIG, parameter, partly_explained, repaired};
 use muslip_diagnose::campaign::Run;
 use muslip_diagnose::outcome::Diagnosis;
 use muslip_diagnose::repaired::{Repaired, RepairedTerm};

@@ -1,8 +1,6 @@
 //! `muslip estimate`: the contract's JSON and trace, the verdict, and the truth recovered.
 
-mod common;
-
-use common::{HEADER, RIG, Scratch, measured_data, number, recording_of, words};
+use crate::common::{HEADER, RIG, Scratch, measured_data, number, recording_of, words};
 use serde_json::{Value, json};
 use test_support::scenario::article;
 

@@ -2,17 +2,14 @@
 //! effect that no mechanism accounts for; and nothing at all. The recordings come from the generator of
 //! the sealed trials, which shares no equation with what diagnoses them.
 //!
-//! In release, a minute or so: `cargo test --release -p host-tests --test every_mechanism -- --ignored`;
+//! In release, a minute or so: `cargo test --release -p host-tests every_mechanism -- --ignored`;
 //! `cargo xtask test` runs them so. How often each is found is the trial's to count; here one campaign of
 //! each must go right.
-
-mod common;
-mod diagnosis;
 
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use common::Scratch;
+use crate::common::Scratch;
 use sealed_trial::{Request, generate};
 use serde_json::Value;
 
@@ -75,7 +72,7 @@ impl Diagnosed {
         arguments.extend(runs.iter().map(String::as_str));
         scratch.output(&arguments);
         let text = scratch.read("answer/diagnosis.json");
-        diagnosis::assert_valid(&text);
+        crate::diagnosis::assert_valid(&text);
         let answer: Value = serde_json::from_str(&text).unwrap();
         for named in answer["mechanisms"].as_array().unwrap() {
             let picture = format!(

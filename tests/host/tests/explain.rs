@@ -1,10 +1,8 @@
 //! `muslip explain`, and the field guide that is made of the same words.
 
-mod common;
-
 use std::path::Path;
 
-use common::Scratch;
+use crate::common::Scratch;
 use muslip_diagnose::mechanism::Id;
 use muslip_report::guide::{markdown, pictures};
 

@@ -1,8 +1,6 @@
 //! `muslip fit`: the contract's JSON, the truth recovered, measured data.
 
-mod common;
-
-use common::{HEADER, RIG, Scratch, measured_data, number, recording_of};
+use crate::common::{HEADER, RIG, Scratch, measured_data, number, recording_of};
 use muslip_analysis::fit::{Curve, fit_curve, robust_start};
 use serde_json::Value;
 use test_support::scenario::article;

@@ -1,10 +1,8 @@
 //! Files of other programs in the commands: one call, no rig file, foreign names and units.
 
-mod common;
-
 use std::path::Path;
 
-use common::{HEADER, Scratch, words};
+use crate::common::{HEADER, Scratch, words};
 
 /// The demo's recording as a bench would have made it: MDF 4, packed, km/h, 1/min, kN, the load at a quarter of the rate.
 const BENCH: &str = concat!(
@@ -97,7 +95,7 @@ fn channels_lists_and_writes_a_map_that_finds_them_again() {
     ]);
     assert_eq!(guessed["peak_friction"], mapped["peak_friction"]);
     // The same tables in a rig file.
-    let rig = format!("{}\n{}", common::RIG, scratch.read("map.toml"));
+    let rig = format!("{}\n{}", crate::common::RIG, scratch.read("map.toml"));
     scratch.write("rig.toml", rig);
     let from_rig = scratch.json(&["estimate", "--rig", "rig.toml", "--json", BENCH]);
     assert_eq!(from_rig["peak_friction"], mapped["peak_friction"]);

@@ -1,24 +1,12 @@
 //! `muslip simulate --model` and `muslip predict --score`: a repaired model run forward, and its report's figures
 //! worked out again.
 
-mod common;
-mod diagnosis;
-
 use std::fs;
 
-use common::{Scratch, number, words};
-use diagnosis::{RIG, campaign};
+use crate::common::{Scratch, number, words};
+use crate::diagnosis::{RIG, campaign, lagging};
 use sealed_trial::{Request, generate};
 use serde_json::Value;
-
-/// A lag of the drag channel of 10 ms, which is not in the simulation.
-fn lagging(_: u64) -> Box<dyn FnMut(f64, f64) -> f64> {
-    let mut state = 0.0;
-    Box::new(move |dt, drag| {
-        state += (drag - state) * (1.0 - (-dt / 0.010).exp());
-        state
-    })
-}
 
 /// A campaign with a lagging load cell, diagnosed into `found`.
 struct Bench {

@@ -2,11 +2,8 @@
 //!
 //! A machine without chromium leaves these out and says so; `cargo xtask test` installs it.
 
-mod browser;
-mod common;
-
-use browser::{Browser, NARROW, View, WIDE};
-use common::{RIG, Scratch, recording_of};
+use crate::browser::{Browser, NARROW, View, WIDE};
+use crate::common::{RIG, Scratch, recording_of};
 use serde_json::Value;
 use test_support::scenario::article;
 

@@ -1,12 +1,10 @@
 //! Reading recordings: every complaint is one line that names the exact place, and nothing panics.
 
-mod common;
-
 use std::fs;
 use std::io::Write;
 use std::path::Path;
 
-use common::{HEADER, RIG, Scratch};
+use crate::common::{HEADER, RIG, Scratch};
 use muslip_recordings::recording::{Channel, Recording, Required, Run};
 use proptest::prelude::*;
 
@@ -258,7 +256,7 @@ fn a_recording_may_be_read_several_times_and_keeps_its_errors() {
 fn a_recording_may_come_through_a_pipe() {
     let scratch = Scratch::with_rig(RIG);
     let points = test_support::scenario::article::measurements(1);
-    let text = common::recording_of(points);
+    let text = crate::common::recording_of(points);
     scratch.write("run.csv", &text);
     let arguments = ["estimate", "--rig", "rig.toml", "--json"];
     let from_file = scratch.json(&[&arguments[..], &["run.csv"]].concat());

@@ -1,7 +1,5 @@
 //! `muslip rig` on a simulated rig behind a socket: the controller that is flashed, natively.
 
-mod common;
-
 use std::net::TcpListener;
 use std::process::{Command, Stdio};
 use std::sync::Arc;
@@ -9,7 +7,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-use common::{RIG, Scratch, number, words};
+use crate::common::{RIG, Scratch, number, words};
 use muslip_diagnose::campaign::Rig as DeclaredRig;
 use muslip_diagnose::mechanism::Context;
 use muslip_diagnose::repaired::{Repaired, RepairedParameter, RepairedTerm};

@@ -1,8 +1,6 @@
 //! `muslip simulate`: reproducible recordings of a rig that obeys its own balances.
 
-mod common;
-
-use common::{RIG, Scratch, number};
+use crate::common::{RIG, Scratch, number};
 use muslip_recordings::recording::{Channel, Required, Run};
 
 fn simulate(scratch: &Scratch, out: &str, more: &[&str]) -> Run {

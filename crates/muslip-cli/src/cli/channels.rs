@@ -15,18 +15,18 @@ use super::terminal::Terminal;
 
 /// List the channels of a file: group, name, unit, rate, samples, times, invalid readings, and what column each would be.
 ///
-/// Reads MDF 3 and 4, TDMS, MAT v4 to v7.3, HDF5, Parquet, Arrow, Feather v2 and CSV of any dialect; the format is told by the file's bytes. Damage
-/// is listed, and what can be read whole is read.
+/// Reads MDF 3 and 4, TDMS, MAT v4 to v7.3, HDF5, Parquet, Arrow, Feather v2 and CSV of any dialect; the format is told by the file's bytes. Damaged
+/// parts are listed; intact channels are read.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  \
 muslip channels run.mf4\n  \
 muslip channels run.mf4 --write-map map.toml\n  \
 muslip channels run.mf4 --map map.toml --json | jq '.channels[] | select(.role)'")]
 pub(super) struct Arguments {
-    /// Map of channels (TOML), to see what it finds.
+    /// Map of channels (TOML), to check which channels it selects.
     #[arg(long, value_name = "MAP.toml")]
     map: Option<PathBuf>,
-    /// Write the roles that were found, or guessed, as a map to go on from.
+    /// Write the roles that were found or guessed as a map, to be edited.
     #[arg(long, value_name = "MAP.toml")]
     write_map: Option<PathBuf>,
     /// Print one JSON object and nothing else.

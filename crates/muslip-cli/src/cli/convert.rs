@@ -16,8 +16,8 @@ use super::terminal::Terminal;
 
 /// Convert a file of any format into a recording: the contract's columns in SI units on one time.
 ///
-/// Channels on other rasters are interpolated between their own readings, never beyond them or across gaps; faster ones are low-passed first. What
-/// was done stands in the recording: as comment lines of a CSV, as metadata of Parquet.
+/// Channels on other rasters are interpolated between their own readings, never beyond them or across gaps; faster ones are low-passed first. The
+/// recording says how it was made: in comment lines of a CSV, in metadata of Parquet.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  \
 muslip convert --out run.csv run.mf4\n  \

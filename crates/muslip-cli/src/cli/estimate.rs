@@ -76,12 +76,11 @@ pub(super) struct Arguments {
 /// How to estimate; the campaign has the same.
 #[derive(Debug, Args)]
 pub(super) struct Choices {
-    /// Tyres to start from: peak friction 0.6 ± 0.6 (aircraft) or 1.0 ± 1.0 (automotive). Where it is not
-    /// given it is found from the recording, and `article` starts as aircraft.
+    /// Tyres to start from: peak friction 0.6 ± 0.6 (aircraft) or 1.0 ± 1.0 (automotive). Default: found from
+    /// the recording; with `--estimator article`, aircraft.
     #[arg(long, value_enum)]
     range: Option<RangeChoice>,
-    /// The estimator; `efficient` where it is not given, `article` where `--model` has a low-pass filter on
-    /// the force.
+    /// The estimator. Default: `efficient`; `article` if `--model` has a low-pass filter on the force.
     #[arg(long, value_enum)]
     estimator: Option<EstimatorChoice>,
 }

@@ -11,8 +11,8 @@ use super::failure::Failure;
 /// How channels become columns.
 #[derive(Debug, Args)]
 pub(super) struct Mapping {
-    /// Map of channels (TOML), where a recording's columns are not the contract's: `muslip channels FILE --write-map MAP.toml` writes one.
-    /// Without it the rig file's [channels] count, and without those names and units are guessed.
+    /// Map of channels (TOML), for recordings with other columns than the contract's: `muslip channels FILE --write-map MAP.toml` writes one.
+    /// Default: [channels] of the rig file; without it, channels are guessed from their names and units.
     #[arg(long, value_name = "MAP.toml")]
     pub(super) map: Option<PathBuf>,
 }

@@ -1,5 +1,4 @@
 //! What the command-line tests share: the command, a scratch folder, recordings, measured data.
-#![allow(dead_code, reason = "every test file uses its own part of this module")]
 
 use std::fs;
 use std::path::{Path, PathBuf};

@@ -1,6 +1,5 @@
 //! Diagnoses put together by hand: what the files and the terminal say of them is tested without the
 //! engine, and values that an engine hardly ever gives can be had.
-#![allow(dead_code, reason = "each test file uses its own share")]
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -509,6 +508,15 @@ pub fn monstrous() -> Diagnosis {
         trace.slip[11] = f64::NAN;
     }
     diagnosis
+}
+
+/// A lag of the drag channel of 10 ms, which is not in the simulation.
+pub fn lagging(_: u64) -> Box<dyn FnMut(f64, f64) -> f64> {
+    let mut state = 0.0;
+    Box::new(move |dt, drag| {
+        state += (drag - state) * (1.0 - (-dt / 0.010).exp());
+        state
+    })
 }
 
 /// A campaign on the simulated rig: a recording a seed, each with the drag channel's readings passed
