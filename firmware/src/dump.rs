@@ -18,13 +18,14 @@ pub static EMULATED_PINS: AtomicU32 = AtomicU32::new(0);
 pub fn dump() {
     DUMPED.store(true, Ordering::Relaxed);
     #[allow(unsafe_code, reason = "raw register values")]
-    // SAFETY: BSRR, BDTR and CCR1 are written whole; no other context's read-modify-write can undo it. Without MOE
-    // the valve is off at once, not from the PWM's next period on.
+    // SAFETY: BSRR, BDTR and the compare registers are written whole; no other context's read-modify-write can undo it.
+    // Without MOE both valves are off at once, not from the PWM's next period on; BSRR is for before TIM1 has the pin.
     unsafe {
         (*GPIOB::ptr())
             .bsrr()
             .write(|w| w.bits(1 << (DUMP_LINE + 16)));
         (*TIM1::ptr()).bdtr().write(|w| w.bits(BREAK));
+        (*TIM1::ptr()).ccr2().write(|w| w.bits(0));
         (*TIM1::ptr()).ccr1().write(|w| w.bits(0));
     }
     EMULATED_PINS.store(0, Ordering::Relaxed);

@@ -58,6 +58,7 @@ const TIM4: u32 = 0x4000_0800;
 const TIM5: u32 = 0x4000_0C00;
 const SPI2: u32 = 0x4000_3800;
 const ADC1: u32 = 0x4001_2000;
+const ADC2: u32 = 0x4001_2100;
 const ADC_COMMON: u32 = 0x4001_2300;
 
 /// All 16 bits of a register that has no more.
@@ -128,7 +129,7 @@ const fn pin(port: u32, line: u32, mode: Mode) -> [Setting; 4] {
     ]
 }
 
-/// Ports A, B and C; then the dump valve's pin, whose level was made low before.
+/// Ports A, B and C; then the dump valve's pin, whose level was made low before: an output until TIM1 can have it.
 pub const PORTS: [Setting; 1] = [set("RCC_AHB1ENR", RCC + 0x30, 0b111, 0b111)];
 
 /// The dump valve's pin.
@@ -162,9 +163,12 @@ pub const PINS: [[Setting; 4]; 21] = [
     pin(GPIOA, 6, Mode::AlternatePulledDown(1)),
     pin(GPIOB, 10, Mode::InputPulledDown),
     pin(GPIOC, 0, Mode::Analog),
-    // The dump valve's once more, last of all.
-    DUMP_PIN,
+    // Pressure.
+    pin(GPIOC, 1, Mode::Analog),
 ];
+
+/// The dump valve's pin as TIM1's channel 2N, once that is set up: what breaks TIM1 takes this pin low as well.
+pub const DUMP_PIN_ON_TIMER: [Setting; 4] = pin(GPIOB, 0, Mode::Alternate(1));
 
 /// MOE, of TIM1_BDTR: outputs are driven; a break clears it without any program (17.3.12).
 pub const OUTPUTS_ON: u32 = 1 << 15;
@@ -172,9 +176,15 @@ pub const OUTPUTS_ON: u32 = 1 << 15;
 /// stay off until the program drives them again; LOCK level 1, so that no later write undoes this.
 pub const BREAK: u32 = 1 << 12 | 1 << 10 | 0b01 << 8;
 
-/// The proportional valve on TIM1's channel 1: PWM mode 1 at no duty (17.4).
-pub const VALVE: [Setting; 10] = [
+/// Compare value of the dump valve's channel that holds pressure: beyond the counter's end, and so never low.
+pub const HOLDS: u32 = VALVE_PWM_PERIOD;
+
+/// Both valves on TIM1 (17.4): the proportional one on channel 1, PWM mode 1 at no duty; the dump valve on channel 2's
+/// complementary output alone, the same mode at a duty of none or all, so that one write of one register is either.
+pub const VALVES: [Setting; 12] = [
     set("RCC_APB2ENR", RCC + 0x44, 1, 1),
+    // OIS: the level of each output while a break keeps it off is low.
+    set("TIM1_CR2", TIM1 + 0x04, ALL_16, 0),
     set("TIM1_PSC", TIM1 + 0x28, ALL_16, VALVE_PWM_PRESCALER - 1),
     set("TIM1_ARR", TIM1 + 0x2C, ALL_16, VALVE_PWM_PERIOD - 1),
     Setting {
@@ -182,9 +192,20 @@ pub const VALVE: [Setting; 10] = [
         stays: false,
         ..set("TIM1_CCR1", TIM1 + 0x34, ALL_16, 0)
     },
-    // OC1M = 110, OC1PE: the duty changes at the end of a period.
-    set("TIM1_CCMR1", TIM1 + 0x18, ALL_16, 0b110 << 4 | 1 << 3),
-    set("TIM1_CCER", TIM1 + 0x20, ALL_16, 1),
+    Setting {
+        // Pressure held or not, at once: without preload.
+        stays: false,
+        ..set("TIM1_CCR2", TIM1 + 0x38, ALL_16, 0)
+    },
+    // OC1M = OC2M = 110; OC1PE: the duty changes at the end of a period.
+    set(
+        "TIM1_CCMR1",
+        TIM1 + 0x18,
+        ALL_16,
+        0b110 << 4 | 1 << 3 | 0b110 << 12,
+    ),
+    // CC1E, CC2NE: by itself an output N is not inverted (17.3.11).
+    set("TIM1_CCER", TIM1 + 0x20, ALL_16, 1 | 1 << 6),
     set("TIM1_BDTR", TIM1 + 0x44, ALL_16 & !OUTPUTS_ON, BREAK),
     Setting {
         // While the emergency stop is open the chip keeps it off.
@@ -244,9 +265,9 @@ pub const BRIDGE: [Setting; 2] = [
     ),
 ];
 
-/// ADC1 on channel 10, PC0 (13.13: CCR, SMPR1, SQR3, CR2).
-pub const SUPPLY: [Setting; 5] = [
-    set("RCC_APB2ENR", RCC + 0x44, 1 << 8, 1 << 8),
+/// ADC1 on channel 10, PC0, and ADC2 on channel 11, PC1 (13.13: CCR, SMPR1, SQR3, CR2).
+pub const CONVERTERS: [Setting; 8] = [
+    set("RCC_APB2ENR", RCC + 0x44, 0b11 << 8, 0b11 << 8),
     set(
         "ADC_CCR",
         ADC_COMMON + 0x04,
@@ -256,6 +277,9 @@ pub const SUPPLY: [Setting; 5] = [
     set("ADC1_SMPR1", ADC1 + 0x0C, 0b111, 0b111),
     set("ADC1_SQR3", ADC1 + 0x34, 0x1F, 10),
     set("ADC1_CR2", ADC1 + 0x08, 1, 1),
+    set("ADC2_SMPR1", ADC2 + 0x0C, 0b111 << 3, 0b111 << 3),
+    set("ADC2_SQR3", ADC2 + 0x34, 0x1F, 11),
+    set("ADC2_CR2", ADC2 + 0x08, 1, 1),
 ];
 
 /// What nothing here writes, because it takes waits or a programmer, and what must hold all the same.
@@ -308,15 +332,16 @@ pub fn set_up(settings: &[Setting], bus: &mut impl Registers) {
 
 /// The first register that does not hold what it should, in the order of start-up, and what it holds.
 pub fn first_wrong(bus: &mut impl Registers) -> Option<(&'static Setting, u32)> {
-    const GROUPS: [&[Setting]; 8] = [
+    const GROUPS: [&[Setting]; 9] = [
         &CLOCK,
         &PORTS,
         PINS.as_flattened(),
-        &VALVE,
+        &VALVES,
+        &DUMP_PIN_ON_TIMER,
         &ENCODERS,
         &COUNTERS_ON,
         &BRIDGE,
-        &SUPPLY,
+        &CONVERTERS,
     ];
     for setting in GROUPS.into_iter().flatten().filter(|setting| setting.stays) {
         let read = bus.read(setting.address);
@@ -373,9 +398,11 @@ mod tests {
         }
         for group in [
             &PORTS[..],
+            &DUMP_PIN,
             PINS.as_flattened(),
-            &VALVE,
-            &SUPPLY,
+            &CONVERTERS,
+            &VALVES,
+            &DUMP_PIN_ON_TIMER,
             &ENCODERS,
             &COUNTERS_ON,
             &BRIDGE,
@@ -399,8 +426,8 @@ mod tests {
     fn a_register_that_lost_its_write_is_found_by_its_name() {
         for (enable, lost) in [
             ((RCC + 0x30, 0b111), "GPIOC_PUPDR"),
-            ((RCC + 0x44, 1), "TIM1_PSC"),
-            ((RCC + 0x44, 1 << 8), "ADC_CCR"),
+            // TIM1_CR2 is written first, to what it is.
+            ((RCC + 0x44, 0b11 << 8), "ADC_CCR"),
             ((RCC + 0x40, 0b1111), "TIM3_CCMR1"),
             ((RCC + 0x40, 1 << 14), "SPI2_CR1"),
         ] {
@@ -443,17 +470,70 @@ mod tests {
             &CLOCK[..],
             &PORTS,
             PINS.as_flattened(),
-            &VALVE,
+            &VALVES,
+            &DUMP_PIN_ON_TIMER,
             &ENCODERS,
             &COUNTERS_ON,
             &BRIDGE,
-            &SUPPLY,
+            &CONVERTERS,
         ]
         .into_iter()
         .map(bits)
         .sum();
         assert_eq!(checked, expected);
         assert!(checked > 500, "{checked}");
+    }
+
+    /// Levels of TIM1's channel 1 and channel 2N by what its registers hold (17.3.11, 17.3.12, table 97), at a count, and
+    /// whether the break's line is low; `Err` where one floats.
+    fn outputs(chip: &mut Chip, count: u32, broken: bool) -> Result<[bool; 2], &'static str> {
+        let mut read = |offset| chip.read(TIM1 + offset);
+        let (cr2, ccmr1, ccer, bdtr) = (read(0x04), read(0x18), read(0x20), read(0x44));
+        let [ccr1, ccr2] = [read(0x34), read(0x38)];
+        let breaks = bdtr & 1 << 12 != 0 && broken;
+        let driven = bdtr & 1 << 15 != 0 && !breaks;
+        let level = |mode: u32, compare: u32| match mode & 0b111 {
+            0b110 => count < compare,
+            0b100 => false,
+            0b101 => true,
+            _ => panic!("mode {mode:b}"),
+        };
+        // The enable of each, its polarity, its idle level.
+        let output = |enable: u32, inverted: u32, idle: u32, reference: bool| {
+            if ccer & 1 << enable == 0 {
+                Err("an output that is not enabled floats")
+            } else if driven {
+                Ok(reference != (ccer & 1 << inverted != 0))
+            } else if bdtr & 1 << 10 == 0 {
+                Err("without OSSI an output floats while it is off")
+            } else {
+                Ok(cr2 & 1 << idle != 0)
+            }
+        };
+        Ok([
+            output(0, 1, 8, level(ccmr1 >> 4, ccr1))?,
+            output(6, 7, 11, level(ccmr1 >> 12, ccr2))?,
+        ])
+    }
+
+    #[test]
+    fn an_open_emergency_stop_takes_both_valves_off_whatever_the_program_says() {
+        let mut chip = started(Chip::default());
+        let counts = [0, 1, VALVE_PWM_PERIOD / 2, VALVE_PWM_PERIOD - 1];
+        for (duty, holds) in [(0, 0), (9_000, HOLDS), (VALVE_PWM_PERIOD, HOLDS)] {
+            chip.write(TIM1 + 0x34, duty);
+            chip.write(TIM1 + 0x38, holds);
+            for count in counts {
+                let driven = outputs(&mut chip, count, false);
+                assert_eq!(driven, Ok([count < duty, holds == HOLDS]));
+                assert_eq!(outputs(&mut chip, count, true), Ok([false; 2]));
+            }
+        }
+        // So does a dump by any handler, with the line closed.
+        chip.write(TIM1 + 0x44, BREAK);
+        for count in counts {
+            assert_eq!(outputs(&mut chip, count, false), Ok([false; 2]));
+        }
     }
 
     #[test]
@@ -466,7 +546,7 @@ mod tests {
             (0x4002_0024, 0xF000_0000, 0x1000_0000)
         );
         assert_eq!((mode.address, mode.value), (0x4002_0000, 0x8000_0000));
-        // No pin twice, but for the dump valve's.
+        // No pin twice.
         let mut modes: std::vec::Vec<_> = PINS
             .iter()
             .map(|pin| (pin[3].address, pin[3].mask))

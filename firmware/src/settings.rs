@@ -20,6 +20,8 @@ pub const VALVE_PWM_PRESCALER: u32 = 4;
 pub const VALVE_PWM_PERIOD: u32 = CORE_HZ / VALVE_PWM_PRESCALER / VALVE_PWM_HZ;
 /// Supply of the valves in mV that makes the converter's full scale: 3.3 V behind a divider of 10:1.
 pub const SUPPLY_FULL_SCALE_MV: u32 = 36_300;
+/// Voltage in mV of a pin that makes a converter's full scale.
+pub const PIN_FULL_SCALE_MV: u32 = 3_300;
 /// Core cycles from one sample to the next.
 pub const CYCLES_PER_SAMPLE: u32 = CORE_HZ / 1_000;
 
@@ -39,6 +41,11 @@ pub const fn baud_divisor(clock_hz: u32, baud: u32) -> u16 {
 /// The supply of the valves in mV from the converter's 12 bits.
 pub const fn supply_mv(code: u16) -> u16 {
     low_u16(code as u32 * SUPPLY_FULL_SCALE_MV / 4096)
+}
+
+/// A pin's voltage in mV from a converter's 12 bits.
+pub const fn pin_mv(code: u16) -> u16 {
+    low_u16(code as u32 * PIN_FULL_SCALE_MV / 4096)
 }
 
 /// Calls `condition` until it holds, at most `limit` times; whether it did. Every wait on hardware is one of
@@ -84,10 +91,12 @@ mod tests {
     }
 
     #[test]
-    fn the_supply_is_read_in_millivolts() {
+    fn supply_and_pressure_are_read_in_millivolts() {
         assert_eq!(supply_mv(0), 0);
         assert_eq!(supply_mv(2708), 23_999);
         assert!(supply_mv(4095) < 36_300);
+        assert_eq!(pin_mv(2048), 1_650);
+        assert_eq!(pin_mv(4095), 3_299);
     }
 
     #[test]

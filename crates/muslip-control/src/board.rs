@@ -55,6 +55,8 @@ pub struct RawSample {
     pub bridge: BridgeReading,
     /// Supply of the valves in mV.
     pub supply_mv: u16,
+    /// The pressure transmitter's voltage at the controller's pin in mV.
+    pub pressure_mv: u16,
     /// True where a channel of the emergency stop is open.
     pub emergency_stop: [bool; 2],
     /// The dump valve's output as it is at the pin: true holds pressure.

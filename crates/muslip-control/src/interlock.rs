@@ -26,6 +26,8 @@
 //! | `StopChannels` | one channel of the emergency stop is open and the other is not, for more than 100 ms |
 //! | `DumpOutput` | the dump valve's output is not what it was told, at the second sample |
 //! | `SpeedsDisagree` | brake dumped, vehicle above 5 m/s, slip beyond ±0.05, for more than 2 s |
+//! | `PressureLost` | the pressure transmitter below half of its reading without pressure, or at the end of the scale |
+//! | `PressureWrong` | pressure for ten samples off what the valves can have made of the demand, see [`pressure`](crate::pressure) |
 //! | `BrakeHot` | Σ demand · full torque · wheel speed · dt, less what has cooled, above its limit |
 
 use muslip_record::{Fault, Parameters};
@@ -35,6 +37,7 @@ use crate::board::{BridgeQuality, RawSample};
 use crate::conversion::Converted;
 use crate::encoder::Speed;
 use crate::number::nearest;
+use crate::pressure::BrakeLine;
 use crate::stop::EmergencyStop;
 
 /// Vehicle speed in m/s above which a locked wheel is a fault.
@@ -138,6 +141,7 @@ pub struct Interlocks {
     disagreeing: u16,
     dump_wrong: u8,
     stop: EmergencyStop,
+    line: BrakeLine,
     brake_energy_j: f32,
 }
 
@@ -159,6 +163,7 @@ impl Interlocks {
             disagreeing: 0,
             dump_wrong: 0,
             stop: EmergencyStop::default(),
+            line: BrakeLine::default(),
             brake_energy_j: 0.0,
         }
     }
@@ -209,6 +214,13 @@ impl Interlocks {
             self.dump_wrong.saturating_add(1)
         };
         faults.add_if(self.dump_wrong >= DUMP_SAMPLES, Fault::DumpOutput);
+        self.line.check(
+            raw.pressure_mv,
+            circumstances.demand,
+            &self.parameters.pressure,
+            SAMPLE_S,
+            &mut faults,
+        );
         self.heat(converted, circumstances.demand, &mut faults);
         self.speeds(converted, &mut faults);
         self.free_rolling(converted, told, &mut faults);

@@ -40,6 +40,7 @@ pub mod estimation;
 pub mod interlock;
 pub mod link;
 mod number;
+pub mod pressure;
 pub mod sequence;
 pub mod slip_hold;
 pub mod stop;

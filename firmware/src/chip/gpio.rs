@@ -13,6 +13,11 @@ pub fn dump_line_low(b: &GPIOB) {
     set_up(&registers::DUMP_PIN, &mut Bus);
 }
 
+/// The dump valve's pin is TIM1's, which has it low.
+pub fn dump_line_to_timer() {
+    set_up(&registers::DUMP_PIN_ON_TIMER, &mut Bus);
+}
+
 /// All other pins.
 pub fn start(b: &GPIOB, c: &GPIOC) {
     // The bridge converter's select and reset are high before they are outputs.

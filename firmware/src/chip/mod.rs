@@ -17,17 +17,19 @@ mod encoders;
 mod gpio;
 mod outputs;
 
+use core::ops::Deref;
+
 use muslip_control::board::{Actuators, NotStored, RawSample, Sensors};
 use muslip_control::brake::BrakeOutput;
 use muslip_control::store::{Loaded, Store};
 use muslip_record::Parameters;
-use stm32f4::stm32f405::{ADC1, GPIOB, GPIOC, IWDG, Peripherals};
+use stm32f4::stm32f405::{ADC1, ADC2, GPIOB, GPIOC, IWDG, Peripherals, adc1};
 
 use crate::counter::cycles;
 use crate::dump::DUMP_LINE;
 use crate::flash::ParameterFlash;
 use crate::registers::{self, set_up};
-use crate::settings::{CORE_HZ, supply_mv, wait_for};
+use crate::settings::{CORE_HZ, pin_mv, supply_mv, wait_for};
 use crate::valves::Valves;
 use bridge::Bridge;
 use bus::Bus;
@@ -48,7 +50,8 @@ const EOC: u32 = 1 << 1;
 pub struct ChipSensors {
     encoders: Encoders,
     bridge: Bridge,
-    adc: ADC1,
+    supply: ADC1,
+    pressure: ADC2,
     port_b: GPIOB,
     port_c: GPIOC,
 }
@@ -91,14 +94,16 @@ pub fn start(_: &Peripherals) -> Up {
         .csr()
         .modify(|r, w| unsafe { w.bits(r.bits() | 1 << 24) });
     gpio::start(&p.GPIOB, &p.GPIOC);
-    start_supply(&p.ADC1);
-    let valves = Valves::new(outputs::start_pwm(p.TIM1), DumpPin);
+    start_converters(&p.ADC1, &p.ADC2);
+    let (proportional, dump) = outputs::start(p.TIM1);
+    let valves = Valves::new(proportional, dump);
     let mut store = Store::new(ParameterFlash::new(Bus));
     let loaded = store.load().ok().flatten();
     let sensors = ChipSensors {
         encoders: Encoders::start(p.TIM3, p.TIM4, p.TIM5, p.TIM2),
         bridge: Bridge::start(p.SPI2),
-        adc: p.ADC1,
+        supply: p.ADC1,
+        pressure: p.ADC2,
         port_b: p.GPIOB,
         port_c: p.GPIOC,
     };
@@ -137,13 +142,29 @@ fn check_registers() -> bool {
     wrong.is_none()
 }
 
-/// ADC1, and its first conversion, so that the first sample finds one.
-fn start_supply(adc: &ADC1) {
-    set_up(&registers::SUPPLY, &mut Bus);
+/// Both converters, and their first conversions, so that the first sample finds one of each.
+fn start_converters(supply: &ADC1, pressure: &ADC2) {
+    set_up(&registers::CONVERTERS, &mut Bus);
     // t_STAB is 3 us (data sheet, table 67).
     cortex_m::asm::delay(CORE_HZ / 100_000);
+    for adc in [supply.deref(), pressure.deref()] {
+        convert(adc);
+        wait_for(100_000, || adc.sr().read().bits() & EOC != 0);
+    }
+}
+
+/// Starts a conversion (13.13.3: SWSTART).
+fn convert(adc: &adc1::RegisterBlock) {
     adc.cr2().write(|w| unsafe { w.bits(1 | 1 << 30) });
-    wait_for(100_000, || adc.sr().read().bits() & EOC != 0);
+}
+
+/// The result of the conversion started a sample ago, and the next one started; 0 without one, at which what it measures
+/// counts as lost. Reading it clears the flag.
+fn converted(adc: &adc1::RegisterBlock) -> u16 {
+    let is_there = adc.sr().read().bits() & EOC != 0;
+    let code = adc.dr().read().bits() as u16;
+    convert(adc);
+    if is_there { code } else { 0 }
 }
 
 /// Instructions of one look at the sensors, counted in the emulator, where every bus is ready at once: for docs/rig.md,
@@ -154,7 +175,8 @@ pub fn sampling_instructions() -> u32 {
     let mut sensors = ChipSensors {
         encoders: Encoders::untouched(p.TIM3, p.TIM4, p.TIM5, p.TIM2),
         bridge: Bridge::untouched(p.SPI2),
-        adc: p.ADC1,
+        supply: p.ADC1,
+        pressure: p.ADC2,
         port_b: p.GPIOB,
         port_c: p.GPIOC,
     };
@@ -167,12 +189,7 @@ pub fn sampling_instructions() -> u32 {
 impl Sensors for ChipSensors {
     fn read(&mut self) -> RawSample {
         let [wheel, vehicle] = self.encoders.read();
-        // The result of the conversion started a sample ago; without one the supply counts as lost. Reading it
-        // clears the flag.
-        let converted = self.adc.sr().read().bits() & EOC != 0;
-        let code = self.adc.dr().read().bits() as u16;
-        let code = if converted { code } else { 0 };
-        self.adc.cr2().write(|w| unsafe { w.bits(1 | 1 << 30) });
+        let (supply, pressure) = (converted(&self.supply), converted(&self.pressure));
         let (port_b, port_c) = (
             self.port_b.idr().read().bits(),
             self.port_c.idr().read().bits(),
@@ -182,7 +199,8 @@ impl Sensors for ChipSensors {
             wheel,
             vehicle,
             bridge: self.bridge.read(),
-            supply_mv: supply_mv(code),
+            supply_mv: supply_mv(supply),
+            pressure_mv: pin_mv(pressure),
             emergency_stop: [port_b & 1 << line_b == 0, port_c & 1 << line_c == 0],
             holds: port_b & 1 << DUMP_LINE != 0,
             confirm: port_b & 1 << CONFIRM_LINE != 0,

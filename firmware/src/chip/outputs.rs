@@ -1,14 +1,14 @@
-//! Proportional valve on TIM1's channel 1 (PA8), dump valve on PB0.
+//! Both valves on TIM1, whose break takes them off: the proportional one on channel 1 (PA8), the dump valve on channel 2N
+//! (PB0).
 
 use core::convert::Infallible;
 
 use embedded_hal::digital::{self, OutputPin};
 use embedded_hal::pwm::{self, SetDutyCycle};
-use stm32f4::stm32f405::{GPIOB, TIM1};
+use stm32f4::stm32f405::TIM1;
 
-use super::bus::Bus;
+use super::{bus::Bus, gpio};
 use crate::bits::low_u16;
-use crate::dump::DUMP_LINE;
 use crate::registers;
 use crate::settings::VALVE_PWM_PERIOD;
 
@@ -17,10 +17,11 @@ const PERIOD: u16 = low_u16(VALVE_PWM_PERIOD);
 /// The proportional valve's PWM.
 pub struct ValvePwm(TIM1);
 
-/// The valve's PWM at no duty.
-pub fn start_pwm(timer: TIM1) -> ValvePwm {
-    registers::set_up(&registers::VALVE, &mut Bus);
-    ValvePwm(timer)
+/// TIM1 at no duty and no pressure held, then the dump valve's pin on it.
+pub fn start(timer: TIM1) -> (ValvePwm, DumpPin) {
+    registers::set_up(&registers::VALVES, &mut Bus);
+    gpio::dump_line_to_timer();
+    (ValvePwm(timer), DumpPin)
 }
 
 impl pwm::ErrorType for ValvePwm {
@@ -52,9 +53,9 @@ impl SetDutyCycle for ValvePwm {
 pub struct DumpPin;
 
 impl DumpPin {
-    fn write(bits: u32) {
-        // SAFETY: BSRR is written whole and touches this line only.
-        unsafe { (*GPIOB::ptr()).bsrr().write(|w| w.bits(bits)) };
+    fn compare(value: u32) {
+        // SAFETY: CCR2 is written whole and is this output's alone.
+        unsafe { (*TIM1::ptr()).ccr2().write(|w| w.bits(value as _)) };
     }
 }
 
@@ -64,12 +65,12 @@ impl digital::ErrorType for DumpPin {
 
 impl OutputPin for DumpPin {
     fn set_low(&mut self) -> Result<(), Infallible> {
-        Self::write(1 << (DUMP_LINE + 16));
+        Self::compare(0);
         Ok(())
     }
 
     fn set_high(&mut self) -> Result<(), Infallible> {
-        Self::write(1 << DUMP_LINE);
+        Self::compare(registers::HOLDS);
         Ok(())
     }
 }

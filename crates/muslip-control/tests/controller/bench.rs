@@ -43,6 +43,8 @@ pub struct Rig {
     pub drag_n: f64,
     pub normal_n: f64,
     pub supply_mv: u16,
+    /// The pressure transmitter's mV, whatever the valves are told.
+    pub pressure_mv: Option<u16>,
     pub emergency_stop: [bool; 2],
     /// The dump valve's output stays as it is, whatever it is told.
     pub holds: Option<bool>,
@@ -64,6 +66,7 @@ impl Rig {
             drag_n: 0.0,
             normal_n: 4120.0,
             supply_mv: 24_000,
+            pressure_mv: None,
             emergency_stop: [false; 2],
             holds: None,
             stuck_drag: false,
@@ -108,6 +111,12 @@ impl Actuators for Flash {
         self.stored = Some(*parameters);
         Ok(())
     }
+}
+
+/// What the pressure transmitter of the default parameters reads, of a line that follows at once.
+pub fn pressure_mv(output: BrakeOutput) -> u16 {
+    let share = (f64::from(output.valve_duty) / 65535.0 - 0.1) / 0.8;
+    (333.0 + 2667.0 * share.clamp(0.0, 1.0)) as u16
 }
 
 /// A controller with a host that speaks every 100 ms.
@@ -182,6 +191,10 @@ impl Bench {
                 quality: self.rig.quality,
             },
             supply_mv: self.rig.supply_mv,
+            pressure_mv: self
+                .rig
+                .pressure_mv
+                .unwrap_or_else(|| pressure_mv(self.output)),
             // Somebody tests it when the rig is switched on.
             emergency_stop: if self.stop_is_tested && (2..5).contains(&self.samples) {
                 [true; 2]
