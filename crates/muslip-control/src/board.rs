@@ -72,7 +72,7 @@ pub struct RawSample {
 pub struct EncoderReading {
     /// Edges of channel A, rising and falling, up to the last rising one: two a pulse; wraps.
     pub edges: u16,
-    /// Time of that rising edge in ticks of [`EDGE_TIMER_HZ`](crate::EDGE_TIMER_HZ); wraps.
+    /// Time of that rising edge in ticks of [`Rates::edge_timer_hz`](crate::rates::Rates::edge_timer_hz); wraps.
     pub edge_ticks: u32,
     /// Ticks from that edge to the sample; wraps.
     pub age_ticks: u32,

@@ -131,31 +131,35 @@ pub const VOLT_AT_FULL: Ceiling = ceiling(
 /// Time in which the line's pressure follows.
 pub const RESPONSE_S: Ceiling = ceiling("pressure.response_s", (0.01, 1.0), "s", "PressureWrong");
 
-const FILTER: &str = "EstimatorFault";
+const ESTIMATOR: &str = "EstimatorFault";
 
 /// Translating mass.
-pub const VEHICLE_MASS_KG: Ceiling = ceiling("wheel.vehicle_mass_kg", (0.1, 1e6), "kg", FILTER);
+pub const VEHICLE_MASS_KG: Ceiling = ceiling("wheel.vehicle_mass_kg", (0.1, 1e6), "kg", ESTIMATOR);
 /// Noise of a sample's friction.
-pub const FRICTION_STD: Ceiling = ceiling("estimator.friction_std", (1e-3, 1.0), "-", FILTER);
+pub const FRICTION_STD: Ceiling = ceiling("estimator.friction_std", (1e-3, 1.0), "-", ESTIMATOR);
 /// Factor on it.
 pub const NOISE_INFLATION: Ceiling =
-    ceiling("estimator.noise_inflation", (1.0, 100.0), "-", FILTER);
+    ceiling("estimator.noise_inflation", (1.0, 100.0), "-", ESTIMATOR);
 /// Bandwidth of the slip loop.
 pub const BANDWIDTH_RAD_S: Ceiling = ceiling(
     "slip_control.bandwidth_rad_s",
     (0.1, 1_000.0),
     "rad/s",
-    FILTER,
+    ESTIMATOR,
 );
 /// Integral time of the slip loop.
-pub const INTEGRAL_TIME_S: Ceiling =
-    ceiling("slip_control.integral_time_s", (1e-3, 100.0), "s", FILTER);
+pub const INTEGRAL_TIME_S: Ceiling = ceiling(
+    "slip_control.integral_time_s",
+    (1e-3, 100.0),
+    "s",
+    ESTIMATOR,
+);
 /// Fastest change of the torque that the slip loop asks for.
 pub const TORQUE_RATE_NM_S: Ceiling = ceiling(
     "slip_control.maximum_torque_rate_nm_s",
     (1.0, 1e8),
     "N m/s",
-    FILTER,
+    ESTIMATOR,
 );
 
 /// All that a filter or the slip loop uses, and no interlock.

@@ -9,35 +9,49 @@
 use muslip_record::{Fault, PressureParameters};
 
 use crate::interlock::FaultSet;
+use crate::rates::Rates;
 
 /// Share of full pressure by which a reading may be off the band.
 pub const TOLERANCE: f32 = 0.15;
-/// Samples for which it may be further off: hammer in the line, a glitch.
-pub const WRONG_SAMPLES: u8 = 10;
+/// Time in ms for which it may be further off: hammer in the line, a glitch.
+pub const WRONG_MS: u32 = 10;
 /// Volt above which the converter is at the end of its scale.
 const LARGEST_V: f32 = 3.2;
 
 /// What the line's pressure may be.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy)]
 pub struct BrakeLine {
+    sample_s: f32,
     /// Edges of the band as shares of full pressure.
     upper: f32,
     lower: f32,
-    wrong: u8,
+    /// Samples from which on a pressure is wrong, and how many it has been.
+    tolerated: u32,
+    wrong: u32,
 }
 
 impl BrakeLine {
-    /// Takes the transmitter's mV at a sample, and the demand of the sample before as a share of full pressure;
-    /// `sample_s` is the time between the two.
+    /// Without pressure, and none asked for.
+    #[must_use]
+    pub const fn new(rates: Rates) -> Self {
+        Self {
+            sample_s: rates.sample_s(),
+            upper: 0.0,
+            lower: 0.0,
+            tolerated: rates.samples(WRONG_MS),
+            wrong: 0,
+        }
+    }
+
+    /// Takes the transmitter's mV at a sample, and the demand of the sample before as a share of full pressure.
     pub fn check(
         &mut self,
         pressure_mv: u16,
         demand: f32,
         parameters: &PressureParameters,
-        sample_s: f32,
         faults: &mut FaultSet,
     ) {
-        let step = sample_s / parameters.response_s;
+        let step = self.sample_s / parameters.response_s;
         self.upper = (self.upper - step).max(demand);
         self.lower = (self.lower + step).min(demand);
         let volt = f32::from(pressure_mv) * 0.001;
@@ -52,7 +66,7 @@ impl BrakeLine {
         } else {
             0
         };
-        faults.add_if(self.wrong >= WRONG_SAMPLES, Fault::PressureWrong);
+        faults.add_if(self.wrong >= self.tolerated, Fault::PressureWrong);
     }
 }
 
@@ -61,7 +75,7 @@ mod tests {
     use super::*;
     use muslip_record::Parameters;
 
-    const SAMPLE_S: f32 = 0.001;
+    const RATES: Rates = Rates::new(1_000, 84_000_000);
 
     /// A line with a first-order lag, valves that may be stuck, and the faults of its last sample.
     struct Line {
@@ -74,7 +88,7 @@ mod tests {
     impl Line {
         fn new(lag_s: f32) -> Self {
             Self {
-                checked: BrakeLine::default(),
+                checked: BrakeLine::new(RATES),
                 share: 0.0,
                 lag_s,
                 faults: FaultSet::default(),
@@ -86,14 +100,13 @@ mod tests {
             let span = pressure.volt_at_full - pressure.volt_at_zero;
             let mv = (1000.0 * (pressure.volt_at_zero + span * share)) as u16;
             self.faults = FaultSet::default();
-            self.checked
-                .check(mv, demand, pressure, SAMPLE_S, &mut self.faults);
+            self.checked.check(mv, demand, pressure, &mut self.faults);
             self.faults != FaultSet::default()
         }
 
         /// A sample of a line whose valves do as they are told.
         fn follow(&mut self, demand: f32) -> bool {
-            self.share += (demand - self.share) * SAMPLE_S / self.lag_s;
+            self.share += (demand - self.share) * RATES.sample_s() / self.lag_s;
             self.read(self.share, demand)
         }
     }
@@ -154,11 +167,11 @@ mod tests {
     #[test]
     fn a_transmitter_without_its_live_zero_or_at_its_end_is_lost_at_once_and_tells_no_pressure() {
         for mv in [0, 166, 3_201, u16::MAX] {
-            let mut checked = BrakeLine::default();
+            let mut checked = BrakeLine::new(RATES);
             for _ in 0..50 {
                 let mut faults = FaultSet::default();
                 let pressure = &Parameters::default().pressure;
-                checked.check(mv, 0.0, pressure, SAMPLE_S, &mut faults);
+                checked.check(mv, 0.0, pressure, &mut faults);
                 assert!(faults.contains(Fault::PressureLost), "{mv}");
                 assert!(!faults.contains(Fault::PressureWrong), "{mv}");
             }

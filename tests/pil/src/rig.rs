@@ -2,13 +2,14 @@
 
 use anyhow::{Result, anyhow};
 use host_sim::{Plant, PlantParameters, RigLaw};
-use muslip_control::EDGE_TIMER_HZ;
 use muslip_control::board::{BridgeQuality, BridgeReading, EncoderReading, RawSample};
 use muslip_control::brake::BrakeOutput;
 use muslip_record::Parameters;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
+
+use crate::target::RATES;
 
 /// Steps of the simulator in a sample.
 const STEPS: u32 = 10;
@@ -123,7 +124,7 @@ impl Encoder {
     }
 
     fn reading(&self, now_s: f64) -> EncoderReading {
-        let ticks = |s: f64| (s * f64::from(EDGE_TIMER_HZ)) as u64;
+        let ticks = |s: f64| (s * f64::from(RATES.edge_timer_hz())) as u64;
         EncoderReading {
             edges: (self.counted as u64 * 2 + 1) as u16,
             edge_ticks: ticks(self.capture_s) as u32,
@@ -320,7 +321,7 @@ mod tests {
     fn the_controllers_own_conversion_reads_the_plants_speeds_and_forces_back() {
         let parameters = Parameters::default();
         let mut rig = Rig::rolling("rudd:0.85,0.14", 20.0, 1, &parameters).unwrap();
-        let mut conversion = Conversion::new(&parameters);
+        let mut conversion = Conversion::new(&parameters, RATES);
         let brake = BrakeOutput::for_demand(0.25, &parameters.brake);
         let mut drag = 0.0;
         for index in 0..600 {

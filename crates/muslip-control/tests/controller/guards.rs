@@ -2,7 +2,7 @@
 
 use muslip_control::brake::BrakeOutput;
 use muslip_control::controller::Identity;
-use muslip_control::interlock::{DISAGREEING_SAMPLES, STUCK_SAMPLES};
+use muslip_control::interlock::{DISAGREEING_MS, STUCK_SAMPLES};
 use muslip_record::{Answer, Command, Fault, Parameters, Profile, Program, Refusal, State};
 
 use crate::bench::{Bench, IDENTITY, RAMP, Rig, pressure_mv};
@@ -135,7 +135,7 @@ fn speeds_that_differ_while_the_wheel_rolls_freely_are_a_fault_after_2_s() {
         }
         assert_eq!(bench.controller.fault(), Some(Fault::SpeedsDisagree));
         // Most of it since before the start.
-        assert!(samples <= u32::from(DISAGREEING_SAMPLES), "{samples}");
+        assert!(samples <= DISAGREEING_MS, "{samples}");
         assert!(samples > 1_800, "{samples}");
     }
     let mut bench = Bench::new();

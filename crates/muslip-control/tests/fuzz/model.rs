@@ -6,7 +6,7 @@ use muslip_control::board::{BridgeQuality, RawSample};
 use muslip_control::brake::BrakeOutput;
 use muslip_control::ceiling::{CEILINGS, RANGES};
 use muslip_control::controller::Controller;
-use muslip_control::interlock::SILENT_SAMPLES;
+use muslip_control::interlock::SILENT_MS;
 use muslip_control::validate;
 use muslip_record::{
     Answer, Command, Envelope, LinkCounters, Origin, Parameters, Profile, Program, Refusal, State,
@@ -134,7 +134,7 @@ impl Model {
                     || raw.pressure_mv > 3_201,
                 "pressure transmitter",
             ),
-            (self.silent > SILENT_SAMPLES, "silence"),
+            (self.silent > SILENT_MS, "silence"),
         ];
         conditions
             .iter()

@@ -5,7 +5,7 @@ use std::path::Path;
 use anyhow::{Result, ensure};
 use muslip_control::board::BridgeQuality;
 use muslip_control::brake::BrakeOutput;
-use muslip_control::interlock::{LOCK_TIME_S, SILENT_SAMPLES};
+use muslip_control::interlock::{LOCK_TIME_S, SILENT_MS};
 use muslip_record::{Command, Fault, Parameters, Profile, Program, State};
 
 use super::{CYCLES_PER_SAMPLE, Found, LAW, RAMP};
@@ -103,7 +103,7 @@ fn injections() -> Vec<Injection> {
             trouble(b, |t| t.extra_vehicle_pulses = 2)
         }),
         Injection {
-            holds: |b| b.host.silent_samples() > u64::from(SILENT_SAMPLES),
+            holds: |b| b.host.silent_samples() > u64::from(SILENT_MS),
             ..at_once(Fault::LinkSilent, |b| b.host.alive = false)
         },
         // Burnt in this sample, which only its end can tell: dumped on the next.
@@ -115,7 +115,7 @@ fn injections() -> Vec<Injection> {
         },
         // The wire says the same over and over: nobody's word.
         Injection {
-            holds: |b| b.host.silent_samples() > u64::from(SILENT_SAMPLES),
+            holds: |b| b.host.silent_samples() > u64::from(SILENT_MS),
             ..at_once(Fault::LinkSilent, |b| b.host.repeats = true)
         },
         Injection {
