@@ -1,33 +1,16 @@
-//! Dumping the brake, from any context and on either board, by the shortest way there is.
+//! Dumping the brake behind the main loop's back.
 
-use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
+use core::sync::atomic::{AtomicBool, Ordering};
 
-use stm32f4::stm32f405::{GPIOB, TIM1};
-
-use crate::registers::BREAK;
-
-/// Line of GPIOB that holds pressure while it is high.
-pub const DUMP_LINE: u32 = 0;
+use crate::board::{Chip, This};
 
 /// Set by whoever dumps the brake behind the main loop's back, until the main loop dumps it itself.
 static DUMPED: AtomicBool = AtomicBool::new(false);
-/// The emulated pins: duty in the lower half, dump valve above.
-pub static EMULATED_PINS: AtomicU32 = AtomicU32::new(0);
 
 /// Dumps the brake; before start-up as well.
 pub fn dump() {
     DUMPED.store(true, Ordering::Relaxed);
-    #[allow(unsafe_code, reason = "raw register values")]
-    // SAFETY: BSRR, BDTR and CCR1 are written whole; no other context's read-modify-write can undo it. Without MOE
-    // the valve is off at once, not from the PWM's next period on.
-    unsafe {
-        (*GPIOB::ptr())
-            .bsrr()
-            .write(|w| w.bits(1 << (DUMP_LINE + 16)));
-        (*TIM1::ptr()).bdtr().write(|w| w.bits(BREAK));
-        (*TIM1::ptr()).ccr1().write(|w| w.bits(0));
-    }
-    EMULATED_PINS.store(0, Ordering::Relaxed);
+    This::dump();
 }
 
 /// Whether the brake was dumped by [`dump`] and the main loop has not caught up; it catches up by dumping.

@@ -14,13 +14,13 @@ use core::sync::atomic::{AtomicU32, Ordering};
 
 use cortex_m::peripheral::SCB;
 use cortex_m_rt::exception;
-use muslip_control::emulation::FromFirmware;
 use muslip_record::{End, PostMortem, State};
 
+use crate::board::{Chip, This};
 use crate::dump::dump;
 use crate::post_mortem::{WORDS, packed, state_of, unpacked};
 use crate::stack::GUARD_BYTES;
-use crate::{emulator, heat, totals};
+use crate::{heat, totals};
 
 /// Bytes of the handlers' own stack.
 const HANDLER_STACK_BYTES: usize = 2048;
@@ -99,7 +99,7 @@ pub fn guard_stack() {
     // SAFETY: called once at start-up, far above the guarded bytes.
     let mut core = unsafe { cortex_m::Peripherals::steal() };
     let end = (&raw const _stack_end) as u32;
-    // SAFETY: a region of GUARD_BYTES, aligned because the stack begins with a memory (memory.x); nothing else
+    // SAFETY: a region of GUARD_BYTES, aligned because the stack begins with a memory (board.x); nothing else
     // lives there.
     unsafe {
         core.MPU.rnr.write(0);
@@ -173,11 +173,14 @@ extern "C" fn on_fault(frame: *const u32) -> ! {
     end(cause, [program_counter, link_register])
 }
 
-/// The crystal has stopped: the core runs on from its internal oscillator, at a tenth of its clock (7.2.7).
-// SAFETY: never returns to what it interrupted.
+/// The crystal has stopped: the core runs on from its internal oscillator, at a tenth of its clock (RM0090, 7.2.7).
+// SAFETY: never returns to what it interrupted, but from what changes nothing there.
 #[allow(unsafe_code, reason = "the handler is unsafe by its type")]
 #[exception]
-unsafe fn NonMaskableInt() -> ! {
+unsafe fn NonMaskableInt() {
+    if This::goes_on_after_nmi() {
+        return;
+    }
     dump();
     end(End::Crystal, [0; 2])
 }
@@ -217,10 +220,6 @@ fn end(cause: End, [program_counter, link_register]: [u32; 2]) -> ! {
     unsafe {
         ptr::write_volatile(RECORD.0.get().cast::<[u32; WORDS]>(), packed(&record));
     }
-    let output = emulator::output();
-    emulator::say(&FromFirmware::Dumped {
-        panic: cause == End::Panic,
-        output,
-    });
+    This::ended(cause == End::Panic);
     SCB::sys_reset()
 }

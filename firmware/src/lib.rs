@@ -1,8 +1,15 @@
-//! The rig controller's board: what lies between `muslip-control` and the registers of an STM32F405.
+//! The rig controller's boards: what lies between `muslip-control` and the registers of a chip.
 //!
-//! On a host this is a small library of what can be tested there: [`flash`], [`heat`], [`valves`], [`log_ring`], [`post_mortem`], [`registers`], [`settings`]. For the
-//! chip it adds the two boards, the interrupts and the main loop. One image serves both boards; which it runs
-//! on is decided at start-up by one bit (see docs/design/0005-controller.md).
+//! A board is one folder, chosen by a feature: its tables of registers, its clocks, UART, converters and flash, and its part
+//! of the linker's script.
+//!
+//! | feature | chip | flash word | edges stamped at |
+//! |---|---|---|---|
+//! | `stm32f405` (default) | STM32F405RG, 168 MHz, run unchanged in QEMU | 4 bytes | 84 MHz |
+//! | `stm32g474` | STM32G474RE, 170 MHz | 8 bytes with ECC | 170 MHz |
+//!
+//! What boards share stands beside the folders: interrupts and main loop ([`mod@registers`] and those for the target), and
+//! what is the same in all STM32 ([`stm32`]). On a host this is a small library of what can be tested there.
 #![no_std]
 #![cfg_attr(
     not(test),
@@ -20,13 +27,21 @@
     clippy::allow_attributes_without_reason
 )]
 
+#[cfg(all(feature = "stm32f405", feature = "stm32g474"))]
+compile_error!("an image is for one board: --no-default-features --features BOARD");
+#[cfg(not(any(feature = "stm32f405", feature = "stm32g474")))]
+compile_error!("an image is for a board: --features BOARD");
+
 mod bits;
-pub mod flash;
 pub mod heat;
 pub mod log_ring;
 pub mod post_mortem;
 pub mod registers;
-pub mod settings;
+pub mod stm32;
+#[cfg(any(feature = "stm32f405", test))]
+pub mod stm32f405;
+#[cfg(any(feature = "stm32g474", test))]
+pub mod stm32g474;
 pub mod valves;
 
 #[cfg(target_os = "none")]
@@ -34,15 +49,13 @@ pub mod board;
 #[cfg(target_os = "none")]
 mod cell;
 #[cfg(target_os = "none")]
-mod chip;
-#[cfg(target_os = "none")]
 mod counter;
 #[cfg(target_os = "none")]
 mod dump;
 #[cfg(target_os = "none")]
-mod emulator;
-#[cfg(target_os = "none")]
 mod fault;
+#[cfg(target_os = "none")]
+mod link;
 #[cfg(target_os = "none")]
 mod log;
 #[cfg(target_os = "none")]
@@ -53,5 +66,3 @@ pub mod run;
 mod stack;
 #[cfg(target_os = "none")]
 mod totals;
-#[cfg(target_os = "none")]
-mod uart;

@@ -1,11 +1,11 @@
-//! The image that is flashed, and run in QEMU byte for byte.
+//! The image for the STM32F405, flashed and run in QEMU byte for byte.
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
 /// Start-up, then samples for ever.
 #[cfg(target_os = "none")]
 #[cortex_m_rt::entry]
 fn main() -> ! {
-    firmware::run::run(firmware::board::start())
+    firmware::run::run(firmware::stm32f405::start())
 }
 
 #[cfg(not(target_os = "none"))]

@@ -1,15 +1,11 @@
-//! The chip's set-up registers: one table that start-up writes and afterwards reads back.
+//! Set-up registers: a board's tables, which start-up writes and afterwards reads back.
 //!
-//! A write can be lost: the one right after a peripheral's clock is enabled is (erratum ES0182, 2.1.13), and a
+//! A write can be lost: on an STM32F405 the one right after a peripheral's clock is enabled is (erratum ES0182, 2.1.13), and a
 //! prescaler that was never written shows nowhere but in a valve that moves wrongly. So every clock enable is read
-//! back before anything behind it is touched, and at the end all registers are held against this table; one that
-//! differs is the fault `SetUp`. Sections are RM0090's.
+//! back before anything behind it is touched, and at the end all registers are held against their tables; one that
+//! differs is the fault `SetUp`.
 
-use crate::settings::{
-    ADC_DIVIDER_BITS, CORE_HZ, PLL, VALVE_PWM_HZ, VALVE_PWM_PERIOD, VALVE_PWM_PRESCALER,
-};
-
-/// Access to registers by address: the bus of the chip, or a test's stand-in.
+/// Access to registers by address: the bus of a chip, or a test's stand-in.
 pub trait Registers {
     /// Reads 32 bits.
     fn read(&mut self, address: u32) -> u32;
@@ -20,9 +16,9 @@ pub trait Registers {
 /// What some bits of a register must be.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Setting {
-    /// The register, as in RM0090.
+    /// The register, as in the chip's reference manual.
     pub name: &'static str,
-    /// Its address (2.3, and the offsets of each chapter).
+    /// Its address.
     pub address: u32,
     /// The bits that are set up; others stay as they are.
     pub mask: u32,
@@ -30,10 +26,15 @@ pub struct Setting {
     pub value: u32,
     /// Whether they can be read back.
     pub stays: bool,
+    /// A clock enable, which is read back before what it enables is touched.
+    pub enables: bool,
 }
 
-/// A setting of bits that stay.
-const fn set(name: &'static str, address: u32, mask: u32, value: u32) -> Setting {
+/// A setting of bits that stay; for a constant.
+///
+/// # Panics
+/// A value outside its mask, which stops the build.
+pub const fn set(name: &'static str, address: u32, mask: u32, value: u32) -> Setting {
     assert!(value & !mask == 0);
     Setting {
         name,
@@ -41,31 +42,90 @@ const fn set(name: &'static str, address: u32, mask: u32, value: u32) -> Setting
         mask,
         value,
         stays: true,
+        enables: false,
     }
 }
 
-const RCC: u32 = 0x4002_3800;
-/// Clock enables, which are read back before what they enable is touched.
-const ENABLES: [u32; 3] = [RCC + 0x30, RCC + 0x40, RCC + 0x44];
-const FLASH: u32 = 0x4002_3C00;
-const GPIOA: u32 = 0x4002_0000;
-const GPIOB: u32 = 0x4002_0400;
-const GPIOC: u32 = 0x4002_0800;
-const TIM1: u32 = 0x4001_0000;
-const TIM2: u32 = 0x4000_0000;
-const TIM3: u32 = 0x4000_0400;
-const TIM4: u32 = 0x4000_0800;
-const TIM5: u32 = 0x4000_0C00;
-const SPI2: u32 = 0x4000_3800;
-const ADC1: u32 = 0x4001_2000;
-const ADC_COMMON: u32 = 0x4001_2300;
+/// A setting of bits that the chip changes by itself, or that read as something else.
+pub const fn set_once(name: &'static str, address: u32, mask: u32, value: u32) -> Setting {
+    Setting {
+        stays: false,
+        ..set(name, address, mask, value)
+    }
+}
+
+/// Clocks switched on.
+pub const fn enable(name: &'static str, address: u32, bits: u32) -> Setting {
+    Setting {
+        enables: true,
+        ..set(name, address, bits, bits)
+    }
+}
 
 /// All 16 bits of a register that has no more.
-const ALL_16: u32 = 0xFFFF;
+pub const ALL_16: u32 = 0xFFFF;
+
+/// A port of pins: its address, and the names of the registers that set up a pin.
+#[derive(Clone, Copy)]
+pub struct Port {
+    address: u32,
+    names: [&'static str; 5],
+}
+
+/// Ports A, B and C of an STM32, the first at this address.
+pub const fn ports(address: u32) -> [Port; 3] {
+    const STRIDE: u32 = 0x400;
+    [
+        Port {
+            address,
+            names: [
+                "GPIOA_PUPDR",
+                "GPIOA_OSPEEDR",
+                "GPIOA_AFRL",
+                "GPIOA_AFRH",
+                "GPIOA_MODER",
+            ],
+        },
+        Port {
+            address: address + STRIDE,
+            names: [
+                "GPIOB_PUPDR",
+                "GPIOB_OSPEEDR",
+                "GPIOB_AFRL",
+                "GPIOB_AFRH",
+                "GPIOB_MODER",
+            ],
+        },
+        Port {
+            address: address + 2 * STRIDE,
+            names: [
+                "GPIOC_PUPDR",
+                "GPIOC_OSPEEDR",
+                "GPIOC_AFRL",
+                "GPIOC_AFRH",
+                "GPIOC_MODER",
+            ],
+        },
+    ]
+}
+
+impl Port {
+    /// Address of the levels of its pins.
+    #[must_use]
+    pub const fn levels(self) -> u32 {
+        self.address + 0x10
+    }
+
+    /// Address at which a bit sets the pin of its number, and 16 bits further up resets it.
+    #[must_use]
+    pub const fn set_reset(self) -> u32 {
+        self.address + 0x18
+    }
+}
 
 /// What a pin is.
 #[derive(Clone, Copy)]
-enum Mode {
+pub enum Mode {
     /// Digital input with pull-down.
     InputPulledDown,
     /// Push-pull output at medium speed, at the level it was given before.
@@ -80,8 +140,8 @@ enum Mode {
     Analog,
 }
 
-/// The four settings of a pin, direction last (8.4.1 to 8.4.10).
-const fn pin(port: u32, line: u32, mode: Mode) -> [Setting; 4] {
+/// The four settings of a pin, direction last: the same on all STM32 that have a MODER.
+pub const fn pin(port: Port, line: u32, mode: Mode) -> [Setting; 4] {
     let (direction, pull, function) = match mode {
         Mode::InputPulledDown => (0b00, 0b10, 0),
         Mode::Output => (0b01, 0b00, 0),
@@ -90,204 +150,29 @@ const fn pin(port: u32, line: u32, mode: Mode) -> [Setting; 4] {
         Mode::AlternatePulledDown(function) => (0b10, 0b10, function),
         Mode::Analog => (0b11, 0b00, 0),
     };
-    let [pulls, speeds, low, high, modes] = match port {
-        GPIOA => [
-            "GPIOA_PUPDR",
-            "GPIOA_OSPEEDR",
-            "GPIOA_AFRL",
-            "GPIOA_AFRH",
-            "GPIOA_MODER",
-        ],
-        GPIOB => [
-            "GPIOB_PUPDR",
-            "GPIOB_OSPEEDR",
-            "GPIOB_AFRL",
-            "GPIOB_AFRH",
-            "GPIOB_MODER",
-        ],
-        _ => [
-            "GPIOC_PUPDR",
-            "GPIOC_OSPEEDR",
-            "GPIOC_AFRL",
-            "GPIOC_AFRH",
-            "GPIOC_MODER",
-        ],
-    };
+    let Port {
+        address,
+        names: [pulls, speeds, low, high, modes],
+    } = port;
     let field = 0b11 << (2 * line);
     let functions = if line < 8 {
-        set(low, port + 0x20, 0xF << (4 * line), function << (4 * line))
+        set(
+            low,
+            address + 0x20,
+            0xF << (4 * line),
+            function << (4 * line),
+        )
     } else {
         let at = 4 * (line - 8);
-        set(high, port + 0x24, 0xF << at, function << at)
+        set(high, address + 0x24, 0xF << at, function << at)
     };
     [
-        set(pulls, port + 0x0C, field, pull << (2 * line)),
-        set(speeds, port + 0x08, field, 0b01 << (2 * line)),
+        set(pulls, address + 0x0C, field, pull << (2 * line)),
+        set(speeds, address + 0x08, field, 0b01 << (2 * line)),
         functions,
-        set(modes, port, field, direction << (2 * line)),
+        set(modes, address, field, direction << (2 * line)),
     ]
 }
-
-/// Ports A, B and C; then the dump valve's pin, whose level was made low before.
-pub const PORTS: [Setting; 1] = [set("RCC_AHB1ENR", RCC + 0x30, 0b111, 0b111)];
-
-/// The dump valve's pin.
-pub const DUMP_PIN: [Setting; 4] = pin(GPIOB, 0, Mode::Output);
-
-/// All other pins; docs/rig.md has the same table with its wires.
-pub const PINS: [[Setting; 4]; 21] = [
-    // Wheel encoder: A to TIM3_CH1 and TIM5_CH1, B to TIM3_CH2.
-    pin(GPIOC, 6, Mode::AlternatePulledUp(2)),
-    pin(GPIOC, 7, Mode::AlternatePulledUp(2)),
-    pin(GPIOA, 0, Mode::AlternatePulledUp(2)),
-    // Vehicle encoder: A to TIM4_CH1 and TIM2_CH1, B to TIM4_CH2.
-    pin(GPIOB, 6, Mode::AlternatePulledUp(2)),
-    pin(GPIOB, 7, Mode::AlternatePulledUp(2)),
-    pin(GPIOA, 15, Mode::AlternatePulledUp(1)),
-    // Host link and log.
-    pin(GPIOA, 2, Mode::Alternate(7)),
-    pin(GPIOA, 3, Mode::AlternatePulledUp(7)),
-    pin(GPIOA, 9, Mode::Alternate(7)),
-    // Bridge converter: select, reset, clock, data in and out.
-    pin(GPIOB, 12, Mode::Output),
-    pin(GPIOC, 5, Mode::Output),
-    pin(GPIOB, 13, Mode::Alternate(5)),
-    pin(GPIOB, 14, Mode::Alternate(5)),
-    pin(GPIOB, 15, Mode::Alternate(5)),
-    // Valve, emergency stop, supply.
-    pin(GPIOA, 8, Mode::Alternate(1)),
-    pin(GPIOB, 1, Mode::InputPulledDown),
-    // The emergency stop's other channel, and the first once more as TIM1's break; the button that confirms.
-    pin(GPIOC, 4, Mode::InputPulledDown),
-    pin(GPIOA, 6, Mode::AlternatePulledDown(1)),
-    pin(GPIOB, 10, Mode::InputPulledDown),
-    pin(GPIOC, 0, Mode::Analog),
-    // The dump valve's once more, last of all.
-    DUMP_PIN,
-];
-
-/// MOE, of TIM1_BDTR: outputs are driven; a break clears it without any program (17.3.12).
-pub const OUTPUTS_ON: u32 = 1 << 15;
-/// The rest of TIM1_BDTR (17.4.18): BKE, break at a low level; OSSI, outputs low and not floating meanwhile; no AOE, they
-/// stay off until the program drives them again; LOCK level 1, so that no later write undoes this.
-pub const BREAK: u32 = 1 << 12 | 1 << 10 | 0b01 << 8;
-
-/// The proportional valve on TIM1's channel 1: PWM mode 1 at no duty (17.4).
-pub const VALVE: [Setting; 10] = [
-    set("RCC_APB2ENR", RCC + 0x44, 1, 1),
-    set("TIM1_PSC", TIM1 + 0x28, ALL_16, VALVE_PWM_PRESCALER - 1),
-    set("TIM1_ARR", TIM1 + 0x2C, ALL_16, VALVE_PWM_PERIOD - 1),
-    Setting {
-        // The duty, which moves.
-        stays: false,
-        ..set("TIM1_CCR1", TIM1 + 0x34, ALL_16, 0)
-    },
-    // OC1M = 110, OC1PE: the duty changes at the end of a period.
-    set("TIM1_CCMR1", TIM1 + 0x18, ALL_16, 0b110 << 4 | 1 << 3),
-    set("TIM1_CCER", TIM1 + 0x20, ALL_16, 1),
-    set("TIM1_BDTR", TIM1 + 0x44, ALL_16 & !OUTPUTS_ON, BREAK),
-    Setting {
-        // While the emergency stop is open the chip keeps it off.
-        stays: false,
-        ..set("TIM1_BDTR", TIM1 + 0x44, OUTPUTS_ON, OUTPUTS_ON)
-    },
-    Setting {
-        stays: false,
-        ..set("TIM1_EGR", TIM1 + 0x14, ALL_16, 1)
-    },
-    // ARPE, CEN.
-    set("TIM1_CR1", TIM1, ALL_16, 1 << 7 | 1),
-];
-
-/// Input filter of counters and captures alike: eight equal samples at the timer's clock (18.4.7: IC1F).
-const FILTER: u32 = 0b0011;
-const CAPTURE_1: u32 = 1 | FILTER << 4;
-const CAPTURE_1_AND_2: u32 = CAPTURE_1 | 1 << 8 | FILTER << 12;
-
-/// Encoder counters and the timers that stamp, all but the counters' start: their count is preset before.
-pub const ENCODERS: [Setting; 17] = [
-    set("RCC_APB1ENR", RCC + 0x40, 0b1111, 0b1111),
-    // Encoder mode on TI1's edges, direction by TI2's level (18.4.3: SMS = 010).
-    set("TIM3_CCMR1", TIM3 + 0x18, ALL_16, CAPTURE_1_AND_2),
-    set("TIM3_SMCR", TIM3 + 0x08, ALL_16, 0b010),
-    set("TIM3_ARR", TIM3 + 0x2C, ALL_16, ALL_16),
-    set("TIM4_CCMR1", TIM4 + 0x18, ALL_16, CAPTURE_1_AND_2),
-    set("TIM4_SMCR", TIM4 + 0x08, ALL_16, 0b010),
-    set("TIM4_ARR", TIM4 + 0x2C, ALL_16, ALL_16),
-    // Free-running over 32 bits, capture of TI1's rising edge (18.4.7, 18.4.9).
-    set("TIM5_PSC", TIM5 + 0x28, ALL_16, 0),
-    set("TIM5_ARR", TIM5 + 0x2C, u32::MAX, u32::MAX),
-    set("TIM5_CCMR1", TIM5 + 0x18, ALL_16, CAPTURE_1),
-    set("TIM5_CCER", TIM5 + 0x20, ALL_16, 1),
-    set("TIM5_CR1", TIM5, ALL_16, 1),
-    set("TIM2_PSC", TIM2 + 0x28, ALL_16, 0),
-    set("TIM2_ARR", TIM2 + 0x2C, u32::MAX, u32::MAX),
-    set("TIM2_CCMR1", TIM2 + 0x18, ALL_16, CAPTURE_1),
-    set("TIM2_CCER", TIM2 + 0x20, ALL_16, 1),
-    set("TIM2_CR1", TIM2, ALL_16, 1),
-];
-
-/// The counters' start; bit 4 of CR1 is their direction, which moves.
-pub const COUNTERS_ON: [Setting; 2] = [
-    set("TIM3_CR1", TIM3, ALL_16 & !(1 << 4), 1),
-    set("TIM4_CR1", TIM4, ALL_16 & !(1 << 4), 1),
-];
-
-/// SPI2 in mode 1 at 10.5 MHz (28.5.1): CPHA, master, APB1 by 4, on, software select.
-pub const BRIDGE: [Setting; 2] = [
-    set("RCC_APB1ENR", RCC + 0x40, 1 << 14, 1 << 14),
-    set(
-        "SPI2_CR1",
-        SPI2,
-        ALL_16,
-        1 | 1 << 2 | 0b001 << 3 | 1 << 6 | 1 << 8 | 1 << 9,
-    ),
-];
-
-/// ADC1 on channel 10, PC0 (13.13: CCR, SMPR1, SQR3, CR2).
-pub const SUPPLY: [Setting; 5] = [
-    set("RCC_APB2ENR", RCC + 0x44, 1 << 8, 1 << 8),
-    set(
-        "ADC_CCR",
-        ADC_COMMON + 0x04,
-        0b11 << 16,
-        ADC_DIVIDER_BITS << 16,
-    ),
-    set("ADC1_SMPR1", ADC1 + 0x0C, 0b111, 0b111),
-    set("ADC1_SQR3", ADC1 + 0x34, 0x1F, 10),
-    set("ADC1_CR2", ADC1 + 0x08, 1, 1),
-];
-
-/// What nothing here writes, because it takes waits or a programmer, and what must hold all the same.
-pub const CLOCK: [Setting; 5] = {
-    let [m, n, p, q] = PLL;
-    [
-        // Crystal, clock security and PLL on (7.3.1).
-        set(
-            "RCC_CR",
-            RCC,
-            1 << 16 | 1 << 19 | 1 << 24,
-            1 << 16 | 1 << 19 | 1 << 24,
-        ),
-        set(
-            "RCC_PLLCFGR",
-            RCC + 0x04,
-            0x0F43_7FFF,
-            m | n << 6 | (p / 2 - 1) << 16 | 1 << 22 | q << 24,
-        ),
-        // PLL in use, AHB undivided, APB1 by 4, APB2 by 2 (7.3.3).
-        set(
-            "RCC_CFGR",
-            RCC + 0x08,
-            0b1100 | 0xF << 4 | 0b111 << 10 | 0b111 << 13,
-            0b1000 | 0b101 << 10 | 0b100 << 13,
-        ),
-        // Five wait states, prefetch, both caches (3.9.1).
-        set("FLASH_ACR", FLASH, 0x70F, 0x705),
-        // Brown-out level 3: reset below 2.7 V (3.9.7; BOR_LEV = 00). In the option bytes: docs/rig.md.
-        set("FLASH_OPTCR", FLASH + 0x14, 0b1100, 0),
-    ]
-};
 
 /// Sets up registers in order; a clock enable is read back before the next.
 pub fn set_up(settings: &[Setting], bus: &mut impl Registers) {
@@ -296,29 +181,24 @@ pub fn set_up(settings: &[Setting], bus: &mut impl Registers) {
             address,
             mask,
             value,
+            enables,
             ..
         } = *setting;
         let others = bus.read(address) & !mask;
         bus.write(address, others | value);
-        if ENABLES.contains(&address) {
+        if enables {
             bus.read(address);
         }
     }
 }
 
-/// The first register that does not hold what it should, in the order of start-up, and what it holds.
-pub fn first_wrong(bus: &mut impl Registers) -> Option<(&'static Setting, u32)> {
-    const GROUPS: [&[Setting]; 8] = [
-        &CLOCK,
-        &PORTS,
-        PINS.as_flattened(),
-        &VALVE,
-        &ENCODERS,
-        &COUNTERS_ON,
-        &BRIDGE,
-        &SUPPLY,
-    ];
-    for setting in GROUPS.into_iter().flatten().filter(|setting| setting.stays) {
+/// The first register of a board's tables that does not hold what it should, and what it holds.
+pub fn first_wrong<'a>(
+    tables: &[&'a [Setting]],
+    bus: &mut impl Registers,
+) -> Option<(&'a Setting, u32)> {
+    let stays = |setting: &&Setting| setting.stays;
+    for setting in tables.iter().copied().flatten().filter(stays) {
         let read = bus.read(setting.address);
         if read & setting.mask != setting.value {
             return Some((setting, read));
@@ -327,20 +207,21 @@ pub fn first_wrong(bus: &mut impl Registers) -> Option<(&'static Setting, u32)> 
     None
 }
 
-const _: () = assert!(CORE_HZ / VALVE_PWM_PRESCALER / VALVE_PWM_HZ == VALVE_PWM_PERIOD);
-const _: () = assert!(VALVE_PWM_PERIOD <= ALL_16);
-
+/// What the tests of every board's tables share.
 #[cfg(test)]
-mod tests {
+pub(crate) mod testing {
     use super::*;
 
     extern crate std;
     use std::collections::BTreeMap;
+    use std::vec::Vec;
 
     /// Registers, and what becomes of the write after a clock enable.
-    #[derive(Default)]
-    struct Chip {
-        registers: BTreeMap<u32, u32>,
+    #[derive(Default, Clone)]
+    pub struct Chip {
+        /// What each holds; 0 before it was written.
+        pub registers: BTreeMap<u32, u32>,
+        enables: Vec<u32>,
         /// Just enabled, and not read since.
         fresh: bool,
         /// An enable whose next write is lost whatever is read before.
@@ -359,106 +240,112 @@ mod tests {
                 return;
             }
             let before = self.registers.insert(address, value).unwrap_or(0);
-            if ENABLES.contains(&address) && before != value {
+            if self.enables.contains(&address) && before != value {
                 self.fresh = true;
                 self.deaf = self.deaf_after == Some((address, value & !before));
             }
         }
     }
 
-    fn started(mut chip: Chip) -> Chip {
-        // The clock is set up apart.
-        for setting in CLOCK {
-            chip.registers.insert(setting.address, setting.value);
-        }
-        for group in [
-            &PORTS[..],
-            PINS.as_flattened(),
-            &VALVE,
-            &SUPPLY,
-            &ENCODERS,
-            &COUNTERS_ON,
-            &BRIDGE,
-        ] {
-            set_up(group, &mut chip);
-        }
-        chip
+    /// A board's tables.
+    pub struct Board<'a> {
+        /// What start-up writes, in its order.
+        pub written: &'a [&'a [Setting]],
+        /// What a chip holds before, because it takes waits.
+        pub held: &'a [Setting],
+        /// What is held against the chip.
+        pub checked: &'a [&'a [Setting]],
     }
 
-    #[test]
-    fn the_write_after_an_enable_is_not_lost() {
-        assert_eq!(first_wrong(&mut started(Chip::default())), None);
-        // The chip does lose it where the enable is not read back.
-        let mut chip = Chip::default();
-        chip.write(RCC + 0x44, 1);
-        chip.write(TIM1 + 0x28, 3);
-        assert_eq!(chip.read(TIM1 + 0x28), 0);
-    }
-
-    #[test]
-    fn a_register_that_lost_its_write_is_found_by_its_name() {
-        for (enable, lost) in [
-            ((RCC + 0x30, 0b111), "GPIOC_PUPDR"),
-            ((RCC + 0x44, 1), "TIM1_PSC"),
-            ((RCC + 0x44, 1 << 8), "ADC_CCR"),
-            ((RCC + 0x40, 0b1111), "TIM3_CCMR1"),
-            ((RCC + 0x40, 1 << 14), "SPI2_CR1"),
-        ] {
-            let mut chip = started(Chip {
-                deaf_after: Some(enable),
-                ..Chip::default()
-            });
-            let wrong = first_wrong(&mut chip).map(|(setting, _)| setting.name);
-            assert_eq!(wrong, Some(lost));
+    impl Board<'_> {
+        fn chip(&self) -> Chip {
+            let mut chip = Chip::default();
+            for setting in self.held {
+                *chip.registers.entry(setting.address).or_default() |= setting.value;
+            }
+            let all = self.written.iter().copied().flatten();
+            chip.enables = all
+                .filter(|setting| setting.enables)
+                .map(|setting| setting.address)
+                .collect();
+            chip
         }
-    }
 
-    #[test]
-    fn every_bit_that_is_set_up_is_checked() {
-        let mut checked = 0;
-        let whole = started(Chip::default()).registers;
-        for (&address, &value) in &whole {
-            for bit in 0..32 {
-                let mut registers = whole.clone();
-                registers.insert(address, value ^ 1 << bit);
-                let mut chip = Chip {
-                    registers,
-                    ..Chip::default()
-                };
-                if let Some((wrong, read)) = first_wrong(&mut chip) {
-                    assert!(wrong.address == address && wrong.mask & 1 << bit != 0);
-                    assert_eq!(read, value ^ 1 << bit);
-                    checked += 1;
+        fn start(&self, mut chip: Chip) -> Chip {
+            for table in self.written {
+                set_up(table, &mut chip);
+            }
+            chip
+        }
+
+        /// A chip that was started up.
+        pub fn started(&self) -> Chip {
+            self.start(self.chip())
+        }
+
+        /// No write is lost on a chip that loses the one right after an enable.
+        pub fn loses_no_write(&self) {
+            assert_eq!(first_wrong(self.checked, &mut self.started()), None);
+            let mut lossy = self.chip();
+            let enable = lossy.enables[0];
+            lossy.write(enable, u32::MAX);
+            lossy.write(4, 3);
+            assert_eq!(lossy.read(4), 0, "the stand-in loses nothing");
+        }
+
+        /// The register whose write is lost where one is lost all the same, after this enable of these bits.
+        pub fn lost_after(&self, enable: (u32, u32)) -> Option<&'static str> {
+            let mut chip = self.chip();
+            chip.deaf_after = Some(enable);
+            let mut started = self.start(chip);
+            first_wrong(self.checked, &mut started).map(|(setting, _)| setting.name)
+        }
+
+        /// Every bit of every setting that stays is missed where it is another; how many there are.
+        pub fn every_bit_is_checked(&self) -> u32 {
+            let whole = self.started();
+            let mut found = 0;
+            for (&address, &value) in &whole.registers {
+                for bit in 0..32 {
+                    let mut chip = whole.clone();
+                    chip.registers.insert(address, value ^ 1 << bit);
+                    if let Some((wrong, read)) = first_wrong(self.checked, &mut chip) {
+                        assert!(wrong.address == address && wrong.mask & 1 << bit != 0);
+                        assert_eq!(read, value ^ 1 << bit);
+                        found += 1;
+                    }
                 }
             }
-        }
-        let bits = |group: &[Setting]| -> u32 {
-            let mut masks = BTreeMap::new();
-            for setting in group.iter().filter(|setting| setting.stays) {
-                *masks.entry(setting.address).or_insert(0) |= setting.mask;
+            let mut masks = BTreeMap::<u32, u32>::new();
+            let stays = |setting: &&Setting| setting.stays;
+            for setting in self.checked.iter().copied().flatten().filter(stays) {
+                *masks.entry(setting.address).or_default() |= setting.mask;
             }
-            masks.values().map(|mask: &u32| mask.count_ones()).sum()
-        };
-        let expected: u32 = [
-            &CLOCK[..],
-            &PORTS,
-            PINS.as_flattened(),
-            &VALVE,
-            &ENCODERS,
-            &COUNTERS_ON,
-            &BRIDGE,
-            &SUPPLY,
-        ]
-        .into_iter()
-        .map(bits)
-        .sum();
-        assert_eq!(checked, expected);
-        assert!(checked > 500, "{checked}");
+            assert_eq!(found, masks.values().map(|mask| mask.count_ones()).sum());
+            found
+        }
     }
+
+    /// No pin is set up twice.
+    pub fn each_pin_once(pins: &[[Setting; 4]]) {
+        let mut modes: Vec<_> = pins
+            .iter()
+            .map(|[.., mode]| (mode.address, mode.mask))
+            .collect();
+        modes.sort_unstable();
+        modes.dedup();
+        assert_eq!(modes.len(), pins.len());
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
 
     #[test]
     fn a_pin_takes_its_own_fields_and_no_others() {
-        let [pull, speed, function, mode] = pin(GPIOA, 15, Mode::AlternatePulledUp(1));
+        let [port, _, _] = ports(0x4002_0000);
+        let [pull, speed, function, mode] = pin(port, 15, Mode::AlternatePulledUp(1));
         assert_eq!((pull.address, pull.mask), (0x4002_000C, 0xC000_0000));
         assert_eq!((pull.value, speed.value), (0x4000_0000, 0x4000_0000));
         assert_eq!(
@@ -466,13 +353,5 @@ mod tests {
             (0x4002_0024, 0xF000_0000, 0x1000_0000)
         );
         assert_eq!((mode.address, mode.value), (0x4002_0000, 0x8000_0000));
-        // No pin twice, but for the dump valve's.
-        let mut modes: std::vec::Vec<_> = PINS
-            .iter()
-            .map(|pin| (pin[3].address, pin[3].mask))
-            .collect();
-        modes.sort_unstable();
-        modes.dedup();
-        assert_eq!(modes.len(), PINS.len());
     }
 }

@@ -9,17 +9,14 @@ use muslip_control::brake::BrakeOutput;
 use muslip_control::controller::{Controller, Resources};
 use muslip_control::emulation::Delays;
 use muslip_record::State;
-use stm32f4::stm32f405::USART1;
 
-use crate::board::{AnyActuators, AnySensors, Started};
+use crate::board::{Chip, Started, This, ThisBoard};
 use crate::cell::InterruptCell;
 use crate::counter::{Interrupter, Most, Stopwatch, cycles, keep};
-use crate::emulator::{self, Took};
+use crate::link::{self, LinkEnd};
 use crate::queue::{self, Sender, Taker};
-use crate::settings::CYCLES_PER_SAMPLE;
 use crate::totals::{LATE, RAISED, WORKED, count};
-use crate::uart::LinkEnd;
-use crate::{board, dump, fault, stack, uart};
+use crate::{board, dump, fault, log, stack};
 
 /// Samples that may wait for the main loop; more than one is already a missed deadline.
 const WAITING_SAMPLES: usize = 4;
@@ -35,7 +32,7 @@ static WORST_INTERRUPT: Most = Most::new();
 static MASKED: Most = Most::new();
 
 struct Sampler {
-    sensors: AnySensors,
+    sensors: <ThisBoard as Board>::Sensors,
     samples: Sender<RawSample>,
 }
 
@@ -51,7 +48,7 @@ fn SysTick() {
     let Some(sampler) = sampler else {
         return;
     };
-    emulator::count_free_sample();
+    This::sampled();
     count(&RAISED);
     let mut raw = sampler.sensors.read();
     // The deadline of a sample is the next one.
@@ -74,7 +71,6 @@ pub fn run(started: Started) -> ! {
         board,
         controller,
         link,
-        log,
     } = started;
     let (sensors, actuators) = board.split();
     let samples = cortex_m::singleton!(: Queue<RawSample, WAITING_SAMPLES> = Queue::new());
@@ -94,7 +90,6 @@ pub fn run(started: Started) -> ! {
             samples: consumer,
             actuators,
             link,
-            log,
             resources: Resources::default(),
             state: State::Idle,
         }
@@ -107,29 +102,38 @@ pub fn run(started: Started) -> ! {
     }
 }
 
+/// What a sample's work took, in cycles.
+pub struct Took {
+    /// The sampling interrupt.
+    pub interrupt: u32,
+    /// The control step.
+    pub control: u32,
+    /// The step and the link's work.
+    pub step: u32,
+}
+
 struct Loop {
     controller: &'static mut Controller,
     samples: Taker<RawSample>,
-    actuators: AnyActuators,
+    actuators: <ThisBoard as Board>::Actuators,
     link: LinkEnd,
-    log: USART1,
     resources: Resources,
     state: State,
 }
 
 impl Loop {
     fn run(mut self) -> ! {
-        board::start_sampling();
+        This::start_sampling();
         loop {
             while let Some(raw) = self.samples.pop() {
                 self.work(&raw);
             }
-            if emulator::runs_freely() {
-                // Without a look at any register: those are slow there.
+            if This::stays_awake() {
+                // Without a look at any register: those are slow in the emulator.
                 cortex_m::asm::delay(1_000);
                 continue;
             }
-            if uart::pump_log(&self.log) {
+            if !log::is_empty() && This::log(log::pop) {
                 continue;
             }
             self.sleep();
@@ -158,7 +162,7 @@ impl Loop {
 
     fn work(&mut self, raw: &RawSample) {
         WORKING.store(true, Ordering::Relaxed);
-        emulator::await_link();
+        This::begins_work();
         let watch = Stopwatch::start();
         let output = self.controller.control(raw);
         // What the interrupt has dumped stays dumped until the controller itself says so; between the look and
@@ -172,15 +176,11 @@ impl Loop {
             self.actuators.actuate(output);
         });
         let control = watch.own();
-        emulator::burn();
-        self.controller.set_overrun_bytes(uart::overrun_bytes());
+        This::valves_are_set();
+        self.controller.set_overrun_bytes(link::overrun_bytes());
         self.controller.set_resources(self.resources);
-        let LinkEnd {
-            receiver,
-            transmitter,
-        } = &mut self.link;
         self.controller
-            .communicate(|| receiver.receive(), transmitter, &mut self.actuators);
+            .communicate(&mut self.link, &mut self.actuators);
         let step = watch.own();
         let elapsed = watch.elapsed();
         self.actuators.feed_watchdog();
@@ -192,7 +192,7 @@ impl Loop {
     /// What a sample's work took by itself up to the valves, and in all; and in all by the clock.
     fn account(&mut self, control: u32, step: u32, elapsed: u32) {
         let interrupt = INTERRUPT.load(Ordering::Relaxed);
-        if elapsed.saturating_add(interrupt) > CYCLES_PER_SAMPLE {
+        if elapsed.saturating_add(interrupt) > This::CYCLES_PER_SAMPLE {
             self.controller.overran();
         }
         let worked = WORKED.load(Ordering::Relaxed);
@@ -200,7 +200,7 @@ impl Loop {
             self.resources.stack_used_bytes = stack::used_bytes();
         }
         self.resources.worst_interrupt_cycles = WORST_INTERRUPT.get();
-        let [receive, send] = uart::worst_cycles();
+        let [receive, send] = link::worst_cycles();
         self.resources.worst_link_interrupt_cycles = receive.max(send);
         let delays = Delays {
             receive,
@@ -209,7 +209,7 @@ impl Loop {
             held_off: board::sampling_held_off(),
         };
         self.resources.worst_step_cycles = self.resources.worst_step_cycles.max(step);
-        uart::kick();
+        This::kick();
         let state = self.controller.state();
         fault::remember(state, self.controller.brake_energy_j());
         if state != self.state {
@@ -227,7 +227,7 @@ impl Loop {
             step,
         };
         let totals = [&RAISED, &WORKED, &LATE].map(|total| total.load(Ordering::Relaxed));
-        emulator::answer(
+        This::worked(
             worked,
             &took,
             delays,

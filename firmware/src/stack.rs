@@ -19,7 +19,7 @@ pub fn used_bytes() -> u32 {
     let top = &raw const _stack_start;
     // What is out of bounds was not used.
     let mut at = (&raw const _stack_end).wrapping_byte_add(GUARD_BYTES);
-    // SAFETY: both symbols bound the stack's region (memory.x), which is all readable memory; volatile because
+    // SAFETY: both symbols bound the stack's region (board.x), which is all readable memory; volatile because
     // this function's own frame lies in it.
     while at < top && unsafe { at.read_volatile() } == STACK_PAINT_VALUE {
         at = at.wrapping_add(1);

@@ -20,6 +20,7 @@ pub fn add(counter: &AtomicU32, amount: u32) {
     counter.store(sum, Ordering::Relaxed);
 }
 
+#[cfg(feature = "stm32f405")]
 /// Forgets the totals, for a run to be counted by itself.
 pub fn reset() {
     for total in [&RAISED, &LATE, &WORKED] {

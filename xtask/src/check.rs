@@ -26,6 +26,23 @@ pub fn run_all() -> Result<()> {
             "--target=thumbv7em-none-eabihf",
         ],
     )?;
+    run(
+        "clippy of the STM32G474's image",
+        cargo(&[
+            "clippy",
+            "--package",
+            "firmware",
+            "--no-default-features",
+            "--features",
+            "stm32g474",
+            "--target",
+            "thumbv7em-none-eabihf",
+            "--locked",
+            "--",
+            "-D",
+            "warnings",
+        ]),
+    )?;
     // Libraries only: the command and the core are both called muslip and would overwrite each other.
     let mut documentation = cargo(&["doc", "--workspace", "--lib", "--no-deps", "--locked"]);
     documentation.env("RUSTDOCFLAGS", "-D warnings");

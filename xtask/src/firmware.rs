@@ -20,6 +20,10 @@ const PROFILE: &str = "firmware";
 const CYCLES_PER_SAMPLE: u64 = 168_000;
 /// Simulated seconds of the endurance run in `cargo xtask test`; ten minutes is `cargo xtask pil --seconds 600`.
 const SECONDS_IN_TEST: &str = "5";
+/// The image for the chip that QEMU has.
+const IMAGE: &str = "muslip-firmware";
+/// Images for other boards, each with the feature of its folder: nothing here runs them.
+const OTHER_BOARDS: [(&str, &str); 1] = [("stm32g474", "muslip-firmware-stm32g474")];
 /// Images with what must not be in one.
 const BAD_IMAGES: [(Forbidden, &str); 3] = [
     (Forbidden::Panic, "panic-image"),
@@ -43,12 +47,17 @@ fn image_path(name: &str) -> PathBuf {
     target_folder().join(TARGET).join(PROFILE).join(name)
 }
 
-/// Builds the image, and those that the checks must refuse.
+/// Builds the image of every board, and those that the checks must refuse.
 pub fn build() -> Result<()> {
     let arguments = ["build", "--locked", "--quiet", "--package", "firmware"];
     let target = ["--profile", PROFILE, "--target", TARGET];
-    let image = [&arguments[..], &target, &["--bin", "muslip-firmware"]].concat();
+    let image = [&arguments[..], &target, &["--bin", IMAGE]].concat();
     run("firmware", cargo(&image))?;
+    for (board, name) in OTHER_BOARDS {
+        let chosen = ["--no-default-features", "--features", board, "--bin", name];
+        let image = [&arguments[..], &target, &chosen].concat();
+        run(&format!("firmware for {board}"), cargo(&image))?;
+    }
     let mut bad = [&arguments[..], &target, &["--features", "test-image"]].concat();
     for (_, name) in BAD_IMAGES {
         bad.extend(["--bin", name]);
@@ -70,10 +79,14 @@ pub fn budgets() -> Result<()> {
 }
 
 fn check_image() -> Result<()> {
-    let image = Image::read(&image_path("muslip-firmware"))?;
-    check_sizes(&image, &budgets_file()?)?;
-    image.is_clean()?;
-    println!("no panic, no software double precision, no heap in the image");
+    let others = OTHER_BOARDS.iter().map(|(_, name)| *name);
+    for name in [IMAGE].into_iter().chain(others) {
+        let image = Image::read(&image_path(name))?;
+        println!("{name}:");
+        check_sizes(&image, &budgets_file()?)?;
+        image.is_clean()?;
+        println!("no panic, no software double precision, no heap in the image");
+    }
     // A check that never fails proves nothing.
     for (what, name) in BAD_IMAGES {
         let bad = Image::read(&image_path(name))?;
@@ -113,7 +126,7 @@ fn loop_command() -> Command {
         "pil",
         "--",
     ]);
-    pil.args([image_path("muslip-firmware"), image_path("panic-image")]);
+    pil.args([image_path(IMAGE), image_path("panic-image")]);
     pil
 }
 
@@ -134,7 +147,7 @@ pub fn pil(arguments: &[String], write: bool) -> Result<()> {
         print!("{latency}");
         let table = check_runs(
             &measured,
-            &Image::read(&image_path("muslip-firmware"))?,
+            &Image::read(&image_path(IMAGE))?,
             &budgets_file()?,
         )?;
         print!("{table}");
@@ -227,7 +240,7 @@ pub fn flash() -> Result<()> {
             "missing probe-rs; install with: cargo install --locked probe-rs-tools --version 0.32.0"
         );
     }
-    let image = image_path("muslip-firmware").display().to_string();
+    let image = image_path(IMAGE).display().to_string();
     run(
         "flash",
         command(

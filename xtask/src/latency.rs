@@ -29,8 +29,9 @@ const PER_ACCESS: u64 = 12;
 /// Accesses of one run of the link's interrupt: status three times, data both ways, control read and written, and one
 /// to spare.
 const LINK_ACCESSES: u64 = 8;
-/// Accesses of one sample: two encoders, four tries, five registers; 24 bytes of the bridge at four; ten more.
-const SAMPLING_ACCESSES: u64 = 2 * 4 * 5 + 24 * 4 + 10;
+/// Accesses of one sample: two encoders, four tries, five registers; 24 bytes of the bridge at four; two converters at
+/// three; seven more.
+const SAMPLING_ACCESSES: u64 = 2 * 4 * 5 + 24 * 4 + 2 * 3 + 7;
 /// The bridge's 24 bytes at 10.5 MHz, and for each a poll that began just before the byte was there.
 const BRIDGE: u64 = 24 * (8 * 16 + PER_ACCESS + 6 * PER_INSTRUCTION);
 

@@ -11,11 +11,11 @@
 //! The response is to the command of the frame before; to NULL it is the STATUS register. The checksum is
 //! CRC-16 with polynomial 0x1021 and seed 0xFFFF over the three words before it, in the upper 16 bits.
 //!
-//! The converter runs at 2,000 conversions a second from 8.192 MHz and is read a thousand times a second. Its data
-//! buffer holds two conversions (section 8.5.1.9.1): [`Ads131m02::read`] reads both and takes their mean. The mean has a
-//! zero at 1 kHz and the converter's own filter (sinc³) one at 2 kHz, where what is read at 1 kHz would fold
-//! onto a constant force; at 900 Hz, which folds onto 100 Hz, 5 % are left (78 % of 4,000 conversions a second, of which
-//! every fourth is taken). Both delay the force by 1.0 ms.
+//! The converter makes two conversions a sample ([`Oversampling`]): 2,000 a second from 8.192 MHz where it is read a
+//! thousand times a second. Its data buffer holds two (section 8.5.1.9.1): [`Ads131m02::read`] reads both and takes their
+//! mean. The mean has a zero at 1 kHz and the converter's own filter (sinc³) one at 2 kHz, where what is read at 1 kHz would
+//! fold onto a constant force; at 900 Hz, which folds onto 100 Hz, 5 % are left (78 % of 4,000 conversions a second, of
+//! which every fourth is taken). Both delay the force by 1.0 ms.
 //!
 //! A converter that has reset itself says so in its status; a register that has changed is found by reading one of
 //! them with each conversion, in the frame that is there anyway. Then it is set up again, two frames a sample.
@@ -24,6 +24,7 @@ use crc::{CRC_16_IBM_3740, Crc, Table};
 use embedded_hal::spi::SpiDevice;
 
 use crate::number::whole_u32;
+use crate::rates::Rates;
 
 /// Bytes of a frame: four words of 24 bits.
 pub const FRAME_BYTES: usize = 12;
@@ -51,8 +52,8 @@ const GAIN_CALIBRATION_OF_1: f32 = 8_388_608.0;
 const ID_TWO_CHANNELS: u16 = 0x22;
 /// 24-bit words, SPI time-out on, and the flag of a past reset cleared.
 const MODE: u16 = 0x0110;
-/// Both channels on, oversampling 2048, high resolution.
-const CLOCK: u16 = 0x0312;
+/// Both channels on, high resolution; the oversampling is in bits 4 to 2.
+const CLOCK: u16 = 0x0302;
 
 /// Registers that are set up.
 const REGISTERS: usize = 7;
@@ -83,6 +84,30 @@ pub enum Gain {
     X64,
     /// 9.375 mV.
     X128,
+}
+
+/// Periods of the converter's own clock of 4.096 MHz that make a conversion: two conversions a sample.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[repr(u8)]
+pub enum Oversampling {
+    /// 2,000 conversions a second, for 1,000 samples.
+    X2048 = 0b100,
+    /// 1,000, for 500 samples.
+    X4096 = 0b101,
+    /// 500, for 250 samples.
+    X8192 = 0b110,
+}
+
+impl Oversampling {
+    /// That of a board's sampling.
+    #[must_use]
+    pub const fn of(rates: Rates) -> Self {
+        match rates.sample_hz() {
+            501.. => Self::X2048,
+            251..=500 => Self::X4096,
+            _ => Self::X8192,
+        }
+    }
 }
 
 /// Settings of one channel.
@@ -137,6 +162,7 @@ pub struct Conversions {
 #[derive(Debug)]
 pub struct Ads131m02<SPI> {
     spi: SPI,
+    oversampling: Oversampling,
     /// What each register is to hold.
     registers: [(u8, u16); REGISTERS],
     /// Step of the set-up that comes next; beyond the last it is set up.
@@ -152,10 +178,11 @@ struct Frame {
 
 impl<SPI: SpiDevice> Ads131m02<SPI> {
     /// The converter, untouched and believed to be set up for two channels as by default.
-    pub fn new(spi: SPI) -> Self {
+    pub fn new(spi: SPI, oversampling: Oversampling) -> Self {
         Self {
             spi,
-            registers: registers([ChannelConfig::default(); 2]),
+            oversampling,
+            registers: registers([ChannelConfig::default(); 2], oversampling),
             step: SET_UP_STEPS,
             looked_at: 0,
         }
@@ -170,7 +197,7 @@ impl<SPI: SpiDevice> Ads131m02<SPI> {
         if !channels.iter().all(within) {
             return Err(AdcError::GainCalibration);
         }
-        self.registers = registers(channels);
+        self.registers = registers(channels, self.oversampling);
         self.step = 0;
         while self.step < SET_UP_STEPS {
             self.set_up()?;
@@ -284,7 +311,7 @@ impl<SPI: SpiDevice> Ads131m02<SPI> {
 }
 
 /// What each register is to hold.
-fn registers(channels: [ChannelConfig; 2]) -> [(u8, u16); REGISTERS] {
+fn registers(channels: [ChannelConfig; 2], oversampling: Oversampling) -> [(u8, u16); REGISTERS] {
     let [drag, normal] = channels;
     let gains = u16::from(normal.gain as u8) << 4 | u16::from(drag.gain as u8);
     let [drag, normal] = channels.map(|channel| {
@@ -296,7 +323,7 @@ fn registers(channels: [ChannelConfig; 2]) -> [(u8, u16); REGISTERS] {
     let ([drag_high, drag_low], [normal_high, normal_low]) = (drag, normal);
     [
         (REGISTER_MODE, MODE),
-        (REGISTER_CLOCK, CLOCK),
+        (REGISTER_CLOCK, CLOCK | (oversampling as u16) << 2),
         (REGISTER_GAIN, gains),
         (REGISTER_GAIN_CALIBRATION_0, drag_high),
         (REGISTER_GAIN_CALIBRATION_0 + 1, drag_low),

@@ -55,6 +55,8 @@ pub struct RawSample {
     pub bridge: BridgeReading,
     /// Supply of the valves in mV.
     pub supply_mv: u16,
+    /// The pressure transmitter's voltage at the controller's pin in mV.
+    pub pressure_mv: u16,
     /// True where a channel of the emergency stop is open.
     pub emergency_stop: [bool; 2],
     /// The dump valve's output as it is at the pin: true holds pressure.
@@ -70,7 +72,7 @@ pub struct RawSample {
 pub struct EncoderReading {
     /// Edges of channel A, rising and falling, up to the last rising one: two a pulse; wraps.
     pub edges: u16,
-    /// Time of that rising edge in ticks of [`EDGE_TIMER_HZ`](crate::EDGE_TIMER_HZ); wraps.
+    /// Time of that rising edge in ticks of [`Rates::edge_timer_hz`](crate::rates::Rates::edge_timer_hz); wraps.
     pub edge_ticks: u32,
     /// Ticks from that edge to the sample; wraps.
     pub age_ticks: u32,

@@ -1,9 +1,10 @@
-//! What no parameter may be set beyond, because an interlock would then never fire.
+//! What no parameter may be set beyond, because an interlock would then never fire, or fire for no reason.
 //!
 //! Parameters come over the link. Those that an interlock compares with have a range here, at compile time; a value
-//! outside it is refused like any other that is out of range. docs/rig.md prints [`CEILINGS`].
+//! outside it is refused like any other that is out of range. docs/rig.md prints [`CEILINGS`]. Those that a filter or the
+//! slip loop reckons with have one as well ([`RANGES`]): beyond it a run would end as `EstimatorFault`.
 
-/// The range of one parameter that an interlock uses.
+/// The range of one parameter that an interlock, a filter or the slip loop uses.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Ceiling {
     /// The parameter, as in a parameters file.
@@ -14,7 +15,7 @@ pub struct Ceiling {
     pub highest: f32,
     /// Their unit.
     pub unit: &'static str,
-    /// What would fail to fire beyond it.
+    /// What would fail to fire beyond it, or fire for no reason.
     pub interlock: &'static str,
 }
 
@@ -118,8 +119,61 @@ pub const BRAKE_ENERGY_J: Ceiling =
 pub const COOLING_TIME_S: Ceiling =
     ceiling("brake_heat.cooling_time_s", (1.0, 3_600.0), "s", "BrakeHot");
 
-/// All of them.
-pub const CEILINGS: [Ceiling; 13] = [
+/// Pressure transmitter without pressure.
+pub const VOLT_AT_ZERO: Ceiling = ceiling("pressure.volt_at_zero", (0.1, 1.0), "V", "PressureLost");
+/// Pressure transmitter at full pressure.
+pub const VOLT_AT_FULL: Ceiling = ceiling(
+    "pressure.volt_at_full",
+    (0.6, 3.1),
+    "V",
+    "PressureLost, PressureWrong",
+);
+/// Time in which the line's pressure follows.
+pub const RESPONSE_S: Ceiling = ceiling("pressure.response_s", (0.01, 1.0), "s", "PressureWrong");
+
+const ESTIMATOR: &str = "EstimatorFault";
+
+/// Translating mass.
+pub const VEHICLE_MASS_KG: Ceiling = ceiling("wheel.vehicle_mass_kg", (0.1, 1e6), "kg", ESTIMATOR);
+/// Noise of a sample's friction.
+pub const FRICTION_STD: Ceiling = ceiling("estimator.friction_std", (1e-3, 1.0), "-", ESTIMATOR);
+/// Factor on it.
+pub const NOISE_INFLATION: Ceiling =
+    ceiling("estimator.noise_inflation", (1.0, 100.0), "-", ESTIMATOR);
+/// Bandwidth of the slip loop.
+pub const BANDWIDTH_RAD_S: Ceiling = ceiling(
+    "slip_control.bandwidth_rad_s",
+    (0.1, 1_000.0),
+    "rad/s",
+    ESTIMATOR,
+);
+/// Integral time of the slip loop.
+pub const INTEGRAL_TIME_S: Ceiling = ceiling(
+    "slip_control.integral_time_s",
+    (1e-3, 100.0),
+    "s",
+    ESTIMATOR,
+);
+/// Fastest change of the torque that the slip loop asks for.
+pub const TORQUE_RATE_NM_S: Ceiling = ceiling(
+    "slip_control.maximum_torque_rate_nm_s",
+    (1.0, 1e8),
+    "N m/s",
+    ESTIMATOR,
+);
+
+/// All that a filter or the slip loop uses, and no interlock.
+pub const RANGES: [Ceiling; 6] = [
+    VEHICLE_MASS_KG,
+    FRICTION_STD,
+    NOISE_INFLATION,
+    BANDWIDTH_RAD_S,
+    INTEGRAL_TIME_S,
+    TORQUE_RATE_NM_S,
+];
+
+/// All that an interlock uses.
+pub const CEILINGS: [Ceiling; 16] = [
     EFFECTIVE_RADIUS_M,
     INERTIA_KG_M2,
     VEHICLE_ENCODER_RADIUS_M,
@@ -133,4 +187,7 @@ pub const CEILINGS: [Ceiling; 13] = [
     WHEEL_CHANGE_RAD_S2,
     BRAKE_ENERGY_J,
     COOLING_TIME_S,
+    VOLT_AT_ZERO,
+    VOLT_AT_FULL,
+    RESPONSE_S,
 ];

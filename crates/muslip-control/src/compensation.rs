@@ -5,16 +5,20 @@ use muslip_compensate::{
     LoadCrosstalk, LoadSensitivity, Parameter, Relaxation, SpeedSensitivity, ThermalFade,
 };
 use muslip_record::{
-    CompensationParameters, RadiusCompensation, RelaxationCompensation, SpeedCompensation,
+    CompensationParameters, RadiusCompensation, RelaxationCompensation, SAMPLE_RATE_HZ,
+    SpeedCompensation,
 };
 
-use crate::SAMPLE_S;
+use crate::rates::Rates;
 
 /// Longest delay of the drag channel in s that can be compensated.
 pub const MAXIMUM_DELAY_S: f32 = 0.06;
 
-/// Samples that the delay line holds: the longest delay, both its ends, and two for rounding.
+/// Samples that the delay line holds: the longest delay at the fastest sampling, both its ends, and two for rounding.
 const LINE_SAMPLES: usize = 64;
+
+/// The sampling at which most of that line is used: what fits then fits every board.
+const FASTEST: Rates = Rates::new(SAMPLE_RATE_HZ, 84_000_000);
 
 /// The compensator of a controller.
 pub type RigCompensator = Compensator<f32, LINE_SAMPLES>;
@@ -49,7 +53,7 @@ pub fn filters_force(p: &CompensationParameters) -> bool {
 pub fn check(p: &CompensationParameters, effective_radius_m: f32) -> Result<(), u8> {
     let delays = 0.0..=MAXIMUM_DELAY_S;
     let delay_fits = p.force_delay_s.is_none_or(|delay| delays.contains(&delay));
-    let fits = effects(p).fits::<LINE_SAMPLES>(effective_radius_m);
+    let fits = effects(p, FASTEST.sample_s()).fits::<LINE_SAMPLES>(effective_radius_m);
     match fits.map_err(number) {
         Ok(()) if delay_fits => Ok(()),
         Ok(()) => Err(1),
@@ -74,13 +78,13 @@ fn number(error: CompensationError) -> u8 {
     }
 }
 
-/// As `muslip-compensate` takes it.
-pub fn effects(p: &CompensationParameters) -> Compensation<f32> {
+/// As `muslip-compensate` takes it, on samples so many seconds apart.
+pub fn effects(p: &CompensationParameters, sample_s: f32) -> Compensation<f32> {
     Compensation {
         effective_radius: p.effective_radius.map(radius),
         force_delay: p.force_delay_s.map(|delay_s| ForceDelay {
             delay_s,
-            sampling_step_s: SAMPLE_S,
+            sampling_step_s: sample_s,
         }),
         force_lag: p
             .force_lag_s

@@ -4,7 +4,7 @@ use heapless::Vec;
 use muslip::sample::RigSample;
 use muslip_record::{
     Answer, Command, Event, Fault, Hello, Origin, PROTOCOL_VERSION, Parameters, PostMortem,
-    Refusal, SAMPLE_RATE_HZ, SAMPLES_PER_ESTIMATE, SCHEMA_HASH, Sample, State, Status, Telemetry,
+    Refusal, SAMPLES_PER_ESTIMATE, SCHEMA_HASH, Sample, State, Status, Telemetry,
 };
 
 use crate::board::{Actuators, BridgeQuality, NotStored, RawSample};
@@ -12,18 +12,21 @@ use crate::brake::BrakeOutput;
 use crate::conversion::{Conversion, Converted, Tare};
 use crate::estimation::Estimation;
 use crate::interlock::{Circumstances, FaultSet, Interlocks};
-use crate::link::{Arrival, Link, Transmit, Urgency};
+use crate::link::{Arrival, Link, Port, Urgency};
 use crate::number::whole_u32;
+use crate::rates::Rates;
 use crate::sequence::{Observed, Sequence};
 use crate::slip_hold::{Refused, SlipHold};
 use crate::validate;
 
-/// Received bytes that one sample's work looks at: more than the wire brings in a sample.
-const BYTES_A_SAMPLE: usize = 128;
+/// Received bytes that are taken at once.
+const RECEIVE_BYTES: u32 = 32;
 
 /// What the board is and how it came up.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Identity {
+    /// How often it samples, and how finely it stamps edges.
+    pub rates: Rates,
     /// Core clock in Hz.
     pub core_clock_hz: u32,
     /// True in the emulator.
@@ -97,16 +100,17 @@ impl Controller {
     /// [`BadParameters`] with the number of the first field outside its range.
     pub fn new(parameters: &Parameters, identity: Identity) -> Result<Self, BadParameters> {
         validate::parameters(parameters).map_err(BadParameters)?;
-        let estimation = Estimation::new(parameters).map_err(|_| BadParameters(NOISE_FIELD))?;
-        let mut sequence = Sequence::default();
+        let estimation =
+            Estimation::new(parameters, identity.rates).map_err(|_| BadParameters(NOISE_FIELD))?;
+        let mut sequence = Sequence::new(identity.rates);
         if identity.watchdog_reset {
             sequence.fail(Fault::Watchdog);
         }
         Ok(Self {
             identity,
             parameters: *parameters,
-            conversion: Conversion::new(parameters),
-            interlocks: Interlocks::new(parameters).heated(identity.brake_energy_j),
+            conversion: Conversion::new(parameters, identity.rates),
+            interlocks: Interlocks::new(parameters, identity.rates).heated(identity.brake_energy_j),
             sequence,
             estimation,
             slip_hold: None,
@@ -200,13 +204,16 @@ impl Controller {
             stop: core::mem::take(&mut self.stop),
         };
         let (parameters, estimation) = (&self.parameters, &mut self.estimation);
+        let rates = self.identity.rates;
         let slip_hold = &mut self.slip_hold;
         let demand = self.sequence.step(&observed, |target| {
-            hold_slip(slip_hold, parameters, target, &converted.sample).unwrap_or_else(|Refused| {
-                // No demand on this sample, a fault on the next.
-                estimation.fail();
-                0.0
-            })
+            hold_slip(slip_hold, parameters, target, &converted.sample, rates).unwrap_or_else(
+                |Refused| {
+                    // No demand on this sample, a fault on the next.
+                    estimation.fail();
+                    0.0
+                },
+            )
         });
         if self.sequence.state() != State::Ramp {
             self.slip_hold = None;
@@ -241,22 +248,24 @@ impl Controller {
     }
 
     /// The link's work after a sample: commands out of what was received, telemetry to the wire.
-    pub fn communicate(
-        &mut self,
-        mut receive: impl FnMut() -> Option<u8>,
-        wire: &mut impl Transmit,
-        actuators: &mut impl Actuators,
-    ) {
-        for _ in 0..BYTES_A_SAMPLE {
-            let Some(byte) = receive() else { break };
-            match self.link.receive(byte) {
-                Some(Arrival::Command(number, command)) => {
-                    let answer = self.obey(&command, wire, actuators);
-                    self.link.answered(number, answer);
-                    self.answer(number, answer, wire);
+    pub fn communicate(&mut self, port: &mut impl Port, actuators: &mut impl Actuators) {
+        self.link.flush(port);
+        for _ in 0..self.identity.rates.link_bytes().div_ceil(RECEIVE_BYTES) {
+            let mut buffer = [0; RECEIVE_BYTES as usize];
+            let received = self.link.take(&mut buffer, port);
+            for &byte in received {
+                match self.link.receive(byte) {
+                    Some(Arrival::Command(number, command)) => {
+                        let answer = self.obey(&command, port, actuators);
+                        self.link.answered(number, answer);
+                        self.answer(number, answer, port);
+                    }
+                    Some(Arrival::Repeated(number, answer)) => self.answer(number, answer, port),
+                    None => {}
                 }
-                Some(Arrival::Repeated(number, answer)) => self.answer(number, answer, wire),
-                None => {}
+            }
+            if received.is_empty() {
+                break;
             }
         }
         if core::mem::take(&mut self.tared) {
@@ -266,47 +275,47 @@ impl Controller {
         // By reference: the queue's own iterator has an index that may panic.
         for &(tick, event) in &core::mem::take(&mut self.events) {
             self.link
-                .send(Telemetry::Event { tick, event }, Urgency::Prompt, wire);
+                .send(Telemetry::Event { tick, event }, Urgency::Prompt, port);
         }
         if let Some(sample) = self.sample.take() {
             self.link
-                .send(Telemetry::Sample(sample), Urgency::Stream, wire);
+                .send(Telemetry::Sample(sample), Urgency::Stream, port);
             if self.tick.is_multiple_of(SAMPLES_PER_ESTIMATE) {
                 let estimate = self.estimation.report(self.tick);
                 self.link
-                    .send(Telemetry::Estimate(estimate), Urgency::Stream, wire);
+                    .send(Telemetry::Estimate(estimate), Urgency::Stream, port);
                 if let Some(slip_hold) = &self.slip_hold {
                     let report = slip_hold.report(self.tick);
                     self.link
-                        .send(Telemetry::QuarterCar(report), Urgency::Stream, wire);
+                        .send(Telemetry::QuarterCar(report), Urgency::Stream, port);
                 }
             }
         }
     }
 
-    fn answer(&mut self, command: u16, answer: Answer, wire: &mut impl Transmit) {
+    fn answer(&mut self, command: u16, answer: Answer, port: &mut impl Port) {
         self.link
-            .send(Telemetry::Answer { command, answer }, Urgency::Prompt, wire);
+            .send(Telemetry::Answer { command, answer }, Urgency::Prompt, port);
     }
 
     fn obey(
         &mut self,
         command: &Command,
-        wire: &mut impl Transmit,
+        port: &mut impl Port,
         actuators: &mut impl Actuators,
     ) -> Answer {
         let done = match command {
             Command::KeepAlive => Ok(()),
             Command::Hello => {
-                self.reply(Telemetry::Hello(self.hello()), wire);
+                self.reply(Telemetry::Hello(self.hello()), port);
                 Ok(())
             }
             Command::ReadParameters => {
-                self.reply(Telemetry::Parameters(self.parameters), wire);
+                self.reply(Telemetry::Parameters(self.parameters), port);
                 Ok(())
             }
             Command::ReadStatus => {
-                self.reply(Telemetry::Status(self.status()), wire);
+                self.reply(Telemetry::Status(self.status()), port);
                 Ok(())
             }
             Command::Arm => self.arm(),
@@ -325,15 +334,15 @@ impl Controller {
         }
     }
 
-    fn reply(&mut self, message: Telemetry, wire: &mut impl Transmit) {
-        self.link.send(message, Urgency::Prompt, wire);
+    fn reply(&mut self, message: Telemetry, port: &mut impl Port) {
+        self.link.send(message, Urgency::Prompt, port);
     }
 
     fn hello(&self) -> Hello {
         Hello {
             protocol_version: PROTOCOL_VERSION,
             schema_hash: SCHEMA_HASH,
-            sample_rate_hz: SAMPLE_RATE_HZ,
+            sample_rate_hz: self.identity.rates.sample_hz(),
             core_clock_hz: self.identity.core_clock_hz,
             emulated: self.identity.emulated,
             estimating: self.estimation.estimating(),
@@ -482,7 +491,7 @@ impl Controller {
             .take(parameters)
             .map_err(|_| Refusal::Parameter(NOISE_FIELD))?;
         self.parameters = *parameters;
-        self.conversion = Conversion::new(parameters);
+        self.conversion = Conversion::new(parameters, self.identity.rates);
         self.interlocks.take(parameters);
         self.tare = None;
         self.store(actuators).map_err(|NotStored| Refusal::Storage)
@@ -513,10 +522,11 @@ fn hold_slip(
     parameters: &Parameters,
     target_slip: f32,
     sample: &RigSample<f32>,
+    rates: Rates,
 ) -> Result<f32, Refused> {
     let hold = match slip_hold {
         Some(hold) => hold,
-        None => slip_hold.insert(SlipHold::new(parameters, target_slip, sample)?),
+        None => slip_hold.insert(SlipHold::new(parameters, target_slip, sample, rates)?),
     };
     hold.step(sample)
 }

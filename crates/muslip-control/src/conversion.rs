@@ -6,6 +6,7 @@ use muslip_record::{ForceParameters, Parameters};
 use crate::board::RawSample;
 use crate::encoder::{Speed, SpeedMeter};
 use crate::number::nearest_signed;
+use crate::rates::Rates;
 
 /// Samples that a tare averages.
 pub const TARE_SAMPLES: u16 = 256;
@@ -33,10 +34,10 @@ pub struct Converted {
 
 impl Conversion {
     /// For these parameters, at standstill.
-    pub fn new(parameters: &Parameters) -> Self {
+    pub fn new(parameters: &Parameters, rates: Rates) -> Self {
         Self {
-            wheel: SpeedMeter::new(&parameters.wheel_encoder),
-            vehicle: SpeedMeter::new(&parameters.vehicle_encoder),
+            wheel: SpeedMeter::new(&parameters.wheel_encoder, rates),
+            vehicle: SpeedMeter::new(&parameters.vehicle_encoder, rates),
             vehicle_radius_m: parameters.vehicle_encoder_radius_m,
             drag: parameters.drag,
             normal: parameters.normal,
@@ -104,7 +105,7 @@ mod tests {
         parameters.drag.newton_per_code = -0.25;
         parameters.normal.newton_per_code = 0.5;
         parameters.drag.zero_code = -500;
-        let mut conversion = Conversion::new(&parameters);
+        let mut conversion = Conversion::new(&parameters, Rates::new(1_000, 84_000_000));
         let mut raw = RawSample::default();
         raw.bridge.codes = [3_500, 8_240];
         let sample = conversion.convert(&raw).sample;

@@ -15,16 +15,13 @@
 //! wheel that rocks on an edge counts up and down and captures an edge each time without turning; neither its count
 //! nor its captures are motion, and the time since the last pulse that counted goes on.
 
-use crate::EDGE_TIMER_HZ;
 use crate::board::EncoderReading;
 use crate::number::nearest;
+use crate::rates::Rates;
 use muslip_record::EncoderParameters;
 
 /// Time without a pulse after which an encoder stands still, in s.
 pub const STANDSTILL_S: f32 = 0.25;
-
-const TICK_S: f32 = 1.0 / nearest(EDGE_TIMER_HZ);
-const STANDSTILL_TICKS: u32 = EDGE_TIMER_HZ / 4;
 
 /// Edges up to the last rising one, from a counter in quadrature mode that counts both edges of channel A
 /// and was preset odd where A was high.
@@ -47,6 +44,8 @@ pub fn rising_edges(count: u16, counts_down: bool) -> u16 {
 #[derive(Debug, Clone, Copy)]
 pub struct SpeedMeter {
     radians_per_pulse: f32,
+    tick_s: f32,
+    standstill_ticks: u32,
     reversed: bool,
     /// Edges counted at the last sample.
     last_edges: Option<u16>,
@@ -76,10 +75,12 @@ pub struct Speed {
 
 impl SpeedMeter {
     /// At standstill.
-    pub fn new(encoder: &EncoderParameters) -> Self {
+    pub fn new(encoder: &EncoderParameters, rates: Rates) -> Self {
         Self {
             radians_per_pulse: core::f32::consts::TAU
                 / f32::from(encoder.pulses_per_revolution.max(1)),
+            tick_s: rates.tick_s(),
+            standstill_ticks: rates.edge_timer_hz() / 4,
             reversed: encoder.reversed,
             last_edges: None,
             pulse_ticks: 0,
@@ -117,13 +118,14 @@ impl SpeedMeter {
                 } else {
                     f32::from(pulses)
                 };
-                self.measured_rad_s = forward * self.radians_per_pulse / (nearest(period) * TICK_S);
+                self.measured_rad_s =
+                    forward * self.radians_per_pulse / (nearest(period) * self.tick_s);
             }
             self.speed_rad_s = self.measured_rad_s;
         }
         let now_ticks = reading.edge_ticks.wrapping_add(reading.age_ticks);
         let age_ticks = now_ticks.wrapping_sub(self.pulse_ticks);
-        if !pulsed && age_ticks >= STANDSTILL_TICKS {
+        if !pulsed && age_ticks >= self.standstill_ticks {
             self.stands = true;
         }
         if self.stands {
@@ -136,9 +138,9 @@ impl SpeedMeter {
                 pulsed,
             };
         }
-        let age_s = nearest(age_ticks) * TICK_S;
+        let age_s = nearest(age_ticks) * self.tick_s;
         if !pulsed {
-            let bound = self.radians_per_pulse / age_s.max(TICK_S);
+            let bound = self.radians_per_pulse / age_s.max(self.tick_s);
             // Not `clamp`, which panics where the bounds are not in order.
             self.speed_rad_s = self.speed_rad_s.min(bound).max(-bound);
         }
@@ -166,7 +168,10 @@ impl SpeedMeter {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::SAMPLE_S;
+
+    const EDGE_TIMER_HZ: u32 = 84_000_000;
+    const RATES: Rates = Rates::new(1_000, EDGE_TIMER_HZ);
+    const SAMPLE_S: f32 = RATES.sample_s();
 
     /// An encoder that turns at a given speed from a given phase, sampled at 1 kHz, its timer starting just
     /// before it wraps.
@@ -191,7 +196,7 @@ mod tests {
                 edge_s: 0.0,
                 now_s: 0.0,
             };
-            (encoder, SpeedMeter::new(&parameters))
+            (encoder, SpeedMeter::new(&parameters, RATES))
         }
 
         fn sample(&mut self, rad_s: f64) -> EncoderReading {
@@ -267,10 +272,13 @@ mod tests {
     #[test]
     fn backwards_is_negative_and_a_reversed_encoder_turns_it_round() {
         let (mut encoder, mut meter) = Encoder::new(500);
-        let mut reversed = SpeedMeter::new(&EncoderParameters {
-            pulses_per_revolution: 500,
-            reversed: true,
-        });
+        let mut reversed = SpeedMeter::new(
+            &EncoderParameters {
+                pulses_per_revolution: 500,
+                reversed: true,
+            },
+            RATES,
+        );
         let mut speeds = (0.0, 0.0);
         for _ in 0..50 {
             let reading = encoder.sample(-20.0);
@@ -353,10 +361,13 @@ mod tests {
     const DUTIES: [f64; 3] = [0.3, 0.5, 0.7];
 
     fn meter(pulses_per_revolution: u16) -> SpeedMeter {
-        SpeedMeter::new(&EncoderParameters {
-            pulses_per_revolution,
-            reversed: false,
-        })
+        SpeedMeter::new(
+            &EncoderParameters {
+                pulses_per_revolution,
+                reversed: false,
+            },
+            RATES,
+        )
     }
 
     #[test]

@@ -12,8 +12,8 @@ use muslip::sample::{RigSample, SampleLimits, SlipFriction, slip_friction};
 use muslip_compensate::{Compensated, StepError};
 use muslip_record::{Estimate, Estimating, Estimator, Parameters, TyreRange};
 
-use crate::SAMPLE_S;
 use crate::compensation::{self, RigCompensator};
+use crate::rates::Rates;
 
 /// Checked parameters that still make no estimator: a noise beyond single precision.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -25,6 +25,7 @@ pub struct Estimation {
     filter: Filter,
     compensator: RigCompensator,
     settings: Settings,
+    sample_s: f32,
     measured: Option<Measured>,
     updates: u32,
     failed: bool,
@@ -137,15 +138,17 @@ impl Estimation {
     ///
     /// # Errors
     /// [`Unestimable`] where checked parameters still make no estimator.
-    pub fn new(parameters: &Parameters) -> Result<Self, Unestimable> {
+    pub fn new(parameters: &Parameters, rates: Rates) -> Result<Self, Unestimable> {
+        let sample_s = rates.sample_s();
         let settings = Settings::of(parameters);
         let (radius_m, limits) = (settings.effective_radius_m, settings.limits);
         Ok(Self {
             filter: Filter::new(parameters)?,
-            compensator: compensation::effects(&parameters.compensation)
+            compensator: compensation::effects(&parameters.compensation, sample_s)
                 .build(radius_m, limits)
                 .map_err(|_| Unestimable)?,
             settings,
+            sample_s,
             measured: None,
             updates: 0,
             failed: false,
@@ -162,7 +165,7 @@ impl Estimation {
         self.measured = None;
         self.updates = 0;
         self.failed = false;
-        let effects = compensation::effects(&parameters.compensation);
+        let effects = compensation::effects(&parameters.compensation, self.sample_s);
         self.compensator
             .replace(
                 &effects,
@@ -213,7 +216,7 @@ impl Estimation {
             })
         } else {
             let state = self.filter.state();
-            match self.compensator.step(sample, SAMPLE_S, &state) {
+            match self.compensator.step(sample, self.sample_s, &state) {
                 Ok(Compensated::Measurement(measured)) => Some(Measured {
                     measurement: measured.measurement(settings.friction_std),
                     expected: Some(measured.expected),

@@ -26,15 +26,18 @@
 //! | `StopChannels` | one channel of the emergency stop is open and the other is not, for more than 100 ms |
 //! | `DumpOutput` | the dump valve's output is not what it was told, at the second sample |
 //! | `SpeedsDisagree` | brake dumped, vehicle above 5 m/s, slip beyond ±0.05, for more than 2 s |
+//! | `PressureLost` | the pressure transmitter below half of its reading without pressure, or at the end of the scale |
+//! | `PressureWrong` | pressure for ten samples off what the valves can have made of the demand, see [`pressure`](crate::pressure) |
 //! | `BrakeHot` | Σ demand · full torque · wheel speed · dt, less what has cooled, above its limit |
 
 use muslip_record::{Fault, Parameters};
 
-use crate::SAMPLE_S;
 use crate::board::{BridgeQuality, RawSample};
 use crate::conversion::Converted;
 use crate::encoder::Speed;
 use crate::number::nearest;
+use crate::pressure::BrakeLine;
+use crate::rates::Rates;
 use crate::stop::EmergencyStop;
 
 /// Vehicle speed in m/s above which a locked wheel is a fault.
@@ -45,16 +48,16 @@ pub const ROLLING_SLIP: f32 = 0.05;
 pub const LOCK_TIME_S: f32 = 0.2;
 /// Share of the vehicle speed below which the wheel's surface counts as locked.
 pub const LOCKED_SHARE: f32 = 0.03;
-/// Samples without a whole frame after which the link is silent.
-pub const SILENT_SAMPLES: u32 = 250;
+/// Time in ms without a whole frame after which the link is silent.
+pub const SILENT_MS: u32 = 250;
 /// The same pair of 24-bit codes this often is no measurement.
 pub const FROZEN_SAMPLES: u8 = 5;
 /// One channel's code the same this often.
 pub const STUCK_SAMPLES: u8 = 25;
 /// Samples within which a third jump of a force is one too many.
 pub const JUMP_SAMPLES: u8 = 25;
-/// Samples for which a freely rolling wheel may differ from the vehicle.
-pub const DISAGREEING_SAMPLES: u16 = 2_000;
+/// Time in ms for which a freely rolling wheel may differ from the vehicle.
+pub const DISAGREEING_MS: u32 = 2_000;
 /// Samples for which the dump valve's output may be other than it was told.
 const DUMP_SAMPLES: u8 = 2;
 /// Magnitude of a code from which a channel is at the end of its scale.
@@ -124,6 +127,7 @@ pub struct Circumstances {
 #[derive(Debug, Clone, Copy)]
 pub struct Interlocks {
     parameters: Parameters,
+    rates: Rates,
     /// Fastest change of the wheel's speed in rad/s².
     wheel_change_rad_s2: f32,
     vehicle_change_rad_s2: f32,
@@ -135,17 +139,19 @@ pub struct Interlocks {
     repeats: [u8; 2],
     last_forces_n: [f32; 2],
     jumps: u8,
-    disagreeing: u16,
+    disagreeing: u32,
     dump_wrong: u8,
     stop: EmergencyStop,
+    line: BrakeLine,
     brake_energy_j: f32,
 }
 
 impl Interlocks {
     /// With these parameters' limits.
-    pub fn new(parameters: &Parameters) -> Self {
+    pub fn new(parameters: &Parameters, rates: Rates) -> Self {
         Self {
             parameters: *parameters,
+            rates,
             wheel_change_rad_s2: wheel_change_rad_s2(parameters),
             vehicle_change_rad_s2: VEHICLE_CHANGE_M_S2 / parameters.vehicle_encoder_radius_m,
             locked_s: 0.0,
@@ -158,7 +164,8 @@ impl Interlocks {
             jumps: 0,
             disagreeing: 0,
             dump_wrong: 0,
-            stop: EmergencyStop::default(),
+            stop: EmergencyStop::new(rates),
+            line: BrakeLine::new(rates),
             brake_energy_j: 0.0,
         }
     }
@@ -168,7 +175,7 @@ impl Interlocks {
         *self = Self {
             stop: self.stop,
             brake_energy_j: self.brake_energy_j,
-            ..Self::new(parameters)
+            ..Self::new(parameters, self.rates)
         };
     }
 
@@ -209,12 +216,18 @@ impl Interlocks {
             self.dump_wrong.saturating_add(1)
         };
         faults.add_if(self.dump_wrong >= DUMP_SAMPLES, Fault::DumpOutput);
+        self.line.check(
+            raw.pressure_mv,
+            circumstances.demand,
+            &self.parameters.pressure,
+            &mut faults,
+        );
         self.heat(converted, circumstances.demand, &mut faults);
         self.speeds(converted, &mut faults);
         self.free_rolling(converted, told, &mut faults);
         self.bridge(raw, converted, &mut faults);
         faults.add_if(
-            circumstances.silent_samples > SILENT_SAMPLES,
+            circumstances.silent_samples > self.rates.samples(SILENT_MS),
             Fault::LinkSilent,
         );
         faults.add_if(circumstances.estimator_failed, Fault::EstimatorFault);
@@ -238,7 +251,7 @@ impl Interlocks {
 
         let surface_m_s = wheel_rad_s * self.parameters.wheel.effective_radius_m;
         if vehicle_m_s > LOCK_SPEED_M_S && surface_m_s < LOCKED_SHARE * vehicle_m_s {
-            self.locked_s = (self.locked_s + SAMPLE_S).max(converted.wheel.age_s);
+            self.locked_s = (self.locked_s + self.rates.sample_s()).max(converted.wheel.age_s);
         } else {
             self.locked_s = 0.0;
         }
@@ -254,6 +267,7 @@ impl Interlocks {
             &converted.wheel,
             self.last_wheel_rad_s,
             self.wheel_change_rad_s2,
+            self.rates.sample_s(),
         );
         faults.add_if(wheel == Plausible::Lost, Fault::WheelSensorLost);
         faults.add_if(wheel == Plausible::OutOfRange, Fault::WheelSensorOutOfRange);
@@ -262,6 +276,7 @@ impl Interlocks {
             &converted.vehicle,
             self.last_vehicle_rad_s,
             self.vehicle_change_rad_s2,
+            self.rates.sample_s(),
         );
         faults.add_if(vehicle == Plausible::Lost, Fault::VehicleSensorLost);
         faults.add_if(
@@ -274,10 +289,11 @@ impl Interlocks {
     /// What the brake takes up at the torque that it is told, which a low friction of its lining only lowers.
     fn heat(&mut self, converted: &Converted, demand: f32, faults: &mut FaultSet) {
         let heat = &self.parameters.brake_heat;
+        let sample_s = self.rates.sample_s();
         let torque_nm = demand * self.parameters.brake.torque_at_full_nm;
         let power_w = torque_nm * converted.wheel.rad_s.max(0.0);
-        let cooled = self.brake_energy_j * (1.0 - SAMPLE_S / heat.cooling_time_s);
-        self.brake_energy_j = cooled + power_w * SAMPLE_S;
+        let cooled = self.brake_energy_j * (1.0 - sample_s / heat.cooling_time_s);
+        self.brake_energy_j = cooled + power_w * sample_s;
         faults.add_if(self.brake_energy_j > heat.maximum_energy_j, Fault::BrakeHot);
     }
 
@@ -293,7 +309,7 @@ impl Interlocks {
             0
         };
         faults.add_if(
-            self.disagreeing > DISAGREEING_SAMPLES,
+            self.disagreeing > self.rates.samples(DISAGREEING_MS),
             Fault::SpeedsDisagree,
         );
     }
@@ -359,8 +375,8 @@ enum Plausible {
     OutOfRange,
 }
 
-/// Whether a speed can have come from the one before it by a change of at most `change_rad_s2`.
-fn plausible(speed: &Speed, last_rad_s: f32, change_rad_s2: f32) -> Plausible {
+/// Whether a speed can have come from the one a sample before it by a change of at most `change_rad_s2`.
+fn plausible(speed: &Speed, last_rad_s: f32, change_rad_s2: f32, sample_s: f32) -> Plausible {
     if !speed.pulsed {
         // Noise of 5 rad/s and a tenth cover the quantum of a coarse tone ring.
         let slowest =
@@ -372,7 +388,7 @@ fn plausible(speed: &Speed, last_rad_s: f32, change_rad_s2: f32) -> Plausible {
         };
     }
     // The pulses span up to one sample more than the samples they are read at.
-    let largest = SPEED_NOISE_RAD_S + 0.1 * last_rad_s.abs() + change_rad_s2 * 2.0 * SAMPLE_S;
+    let largest = SPEED_NOISE_RAD_S + 0.1 * last_rad_s.abs() + change_rad_s2 * 2.0 * sample_s;
     let change = (speed.rad_s - last_rad_s).abs();
     if change > largest || speed.rad_s < -BACKWARD_RAD_S {
         Plausible::OutOfRange

@@ -12,7 +12,8 @@
 //!
 //! Everything here is pure of registers and clocks: a sample goes in, the brake's outputs come out, and the
 //! same arithmetic runs on the chip, in the emulator and natively beside it. Drivers are generic over
-//! `embedded-hal` 1.0 ([`ads131m02`]) and `embedded-storage` ([`store`]).
+//! `embedded-hal` 1.0 ([`ads131m02`]) and `embedded-storage` ([`store`]), the link over `embedded-io` ([`link`]); a board says
+//! how often it samples and how finely it stamps edges ([`rates`]).
 #![no_std]
 #![forbid(unsafe_code)]
 #![cfg_attr(
@@ -40,14 +41,10 @@ pub mod estimation;
 pub mod interlock;
 pub mod link;
 mod number;
+pub mod pressure;
+pub mod rates;
 pub mod sequence;
 pub mod slip_hold;
 pub mod stop;
 pub mod store;
 pub mod validate;
-
-/// Seconds from one sample to the next.
-pub const SAMPLE_S: f32 = 0.001;
-
-/// Ticks a second of the timers that stamp encoder edges: APB1's timer clock at full core clock.
-pub const EDGE_TIMER_HZ: u32 = 84_000_000;

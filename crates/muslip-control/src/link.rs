@@ -1,27 +1,29 @@
 //! The host link: commands out of bytes, telemetry into bytes, everything counted.
+//!
+//! Bytes come and go by a port of `embedded-io` that never makes the controller wait: it is asked whether it is ready
+//! before each call. What a port does not take at once waits here, and goes first at the next sample.
 
+use embedded_io::{Read, ReadReady, Write, WriteReady};
 use muslip_record::{
     Answer, Command, Envelope, FRAME_BYTES, FrameError, FrameReader, LinkCounters, Telemetry,
     encode,
 };
 
-/// Bytes of the transmit buffer that samples and estimates leave to answers and events.
-pub const RESERVED_BYTES: usize = 256;
+/// Bytes that wait for the port: the rest of one frame, and answers and events behind it.
+const WAITING_BYTES: usize = 512;
+const _: () = assert!(WAITING_BYTES >= 2 * FRAME_BYTES);
 
-/// Where outgoing bytes go: a buffer that a UART empties at its own pace.
-pub trait Transmit {
-    /// Bytes that it can take now.
-    fn room(&self) -> usize;
-    /// Takes bytes, no more than [`Transmit::room`].
-    fn send(&mut self, bytes: &[u8]);
-}
+/// A port whose other end empties and fills it at its own pace: a UART with its buffers.
+pub trait Port: Read + ReadReady + Write + WriteReady {}
+
+impl<P: Read + ReadReady + Write + WriteReady> Port for P {}
 
 /// Whether a message may be dropped before others.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Urgency {
-    /// Samples and estimates: leave room for the rest.
+    /// Samples and estimates: only while nothing waits.
     Stream,
-    /// Answers and events.
+    /// Answers and events: while there is room to wait.
     Prompt,
 }
 
@@ -45,6 +47,7 @@ pub struct Link {
     newest: Option<u16>,
     sequence: u16,
     silent_samples: u32,
+    waiting: Waiting,
 }
 
 impl Default for Link {
@@ -72,6 +75,7 @@ impl Link {
             newest: None,
             sequence: 0,
             silent_samples: u32::MAX,
+            waiting: Waiting::new(),
         }
     }
 
@@ -148,22 +152,138 @@ impl Link {
         self.last = Some((sequence, answer));
     }
 
+    /// Received bytes, as many as there are and fit; none where there are none or the port fails.
+    pub fn take<'a>(&mut self, buffer: &'a mut [u8], port: &mut impl Port) -> &'a [u8] {
+        let count = match port.read_ready() {
+            Ok(true) => port.read(buffer).unwrap_or(0),
+            _ => 0,
+        };
+        buffer.get(..count).unwrap_or_default()
+    }
+
+    /// Sends what waits, as much of it as the port takes.
+    pub fn flush(&mut self, port: &mut impl Port) {
+        let taken = written(self.waiting.bytes(), port);
+        self.waiting.drop_first(taken);
+    }
+
     /// Sends a message, or drops and counts it. Its number is used up either way, so that the host sees
     /// the gap.
-    pub fn send(&mut self, message: Telemetry, urgency: Urgency, wire: &mut impl Transmit) {
+    pub fn send(&mut self, message: Telemetry, urgency: Urgency, port: &mut impl Port) {
         let envelope = Envelope {
             sequence: self.sequence,
             body: message,
         };
         self.sequence = self.sequence.wrapping_add(1);
-        let reserve = match urgency {
-            Urgency::Stream => RESERVED_BYTES,
-            Urgency::Prompt => 0,
-        };
+        self.flush(port);
         let mut buffer = [0; FRAME_BYTES];
-        match encode(&envelope, &mut buffer) {
-            Ok(frame) if frame.len() + reserve <= wire.room() => wire.send(frame),
-            _ => self.counters.dropped = self.counters.dropped.saturating_add(1),
+        let sent = encode(&envelope, &mut buffer).is_ok_and(|frame| {
+            if self.waiting.bytes().is_empty() {
+                let taken = written(frame, port);
+                self.waiting.add(frame.get(taken..).unwrap_or_default())
+            } else {
+                urgency == Urgency::Prompt && self.waiting.add(frame)
+            }
+        });
+        if !sent {
+            self.counters.dropped = self.counters.dropped.saturating_add(1);
         }
+    }
+}
+
+/// Writes as much as a port takes without a wait, and says how much that was. A port that fails takes nothing.
+fn written(bytes: &[u8], port: &mut impl Port) -> usize {
+    let mut taken = 0;
+    while let Some(rest) = bytes.get(taken..).filter(|rest| !rest.is_empty()) {
+        let count = match port.write_ready() {
+            Ok(true) => port.write(rest).unwrap_or(0),
+            _ => 0,
+        };
+        if count == 0 {
+            break;
+        }
+        taken += count;
+    }
+    taken
+}
+
+/// Bytes in the order in which they go out.
+#[derive(Debug, Clone)]
+struct Waiting {
+    buffer: [u8; WAITING_BYTES],
+    start: usize,
+    end: usize,
+}
+
+impl Waiting {
+    const fn new() -> Self {
+        Self {
+            buffer: [0; WAITING_BYTES],
+            start: 0,
+            end: 0,
+        }
+    }
+
+    fn bytes(&self) -> &[u8] {
+        self.buffer.get(self.start..self.end).unwrap_or_default()
+    }
+
+    fn drop_first(&mut self, count: usize) {
+        self.start += count;
+        if self.start >= self.end {
+            (self.start, self.end) = (0, 0);
+        }
+    }
+
+    /// Adds all of it or nothing; whether it did.
+    fn add(&mut self, bytes: &[u8]) -> bool {
+        if self.end + bytes.len() > WAITING_BYTES {
+            self.move_to_front();
+        }
+        let end = self.end + bytes.len();
+        let Some(place) = self.buffer.get_mut(self.end..end) else {
+            return false;
+        };
+        place.copy_from_slice(bytes);
+        self.end = end;
+        true
+    }
+
+    fn move_to_front(&mut self) {
+        let length = self.end - self.start;
+        // One by one: a copy within a slice has bounds that may panic.
+        for at in 0..length {
+            let byte = self.buffer.get(self.start + at).copied();
+            if let (Some(place), Some(byte)) = (self.buffer.get_mut(at), byte) {
+                *place = byte;
+            }
+        }
+        (self.start, self.end) = (0, length);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bytes_that_wait_go_out_in_order_and_whole_or_not_at_all() {
+        let mut waiting = Waiting::new();
+        let (mut into, mut out) = (0_u32, 0_u32);
+        for round in 0..2_000_u32 {
+            let frame: [u8; 97] = core::array::from_fn(|at| (into + at as u32) as u8);
+            let before = waiting.bytes().len();
+            let fits = before + 97 <= WAITING_BYTES;
+            assert_eq!(waiting.add(&frame), fits);
+            into += if fits { 97 } else { 0 };
+            let taken = (round * 37 % 150).min(waiting.bytes().len() as u32);
+            for &byte in &waiting.bytes()[..taken as usize] {
+                assert_eq!(byte, out as u8);
+                out += 1;
+            }
+            waiting.drop_first(taken as usize);
+        }
+        assert!(out > 97 * 700, "{out}");
+        assert_eq!(waiting.bytes().len() as u32, into - out);
     }
 }

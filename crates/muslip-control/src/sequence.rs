@@ -21,15 +21,15 @@
 
 use muslip_record::{Fault, Profile, Program, State};
 
-use crate::SAMPLE_S;
 use crate::interlock::{LOCK_SPEED_M_S, ROLLING_SLIP};
 use crate::number::{nearest, whole_u16};
+use crate::rates::Rates;
 
-const ARMED_SAMPLES: u32 = 60_000;
-const SPIN_UP_SAMPLES: u32 = 120_000;
-const ROLLING_SAMPLES_BEFORE_RAMP: u32 = 200;
-const ROLLING_SAMPLES_AFTER_RELEASE: u32 = 50;
-const RELEASE_SAMPLES: u32 = 1_000;
+const ARMED_MS: u32 = 60_000;
+const SPIN_UP_MS: u32 = 120_000;
+const ROLLING_MS_BEFORE_RAMP: u32 = 200;
+const ROLLING_MS_AFTER_RELEASE: u32 = 50;
+const RELEASE_MS: u32 = 1_000;
 
 /// What moves the machine on at a sample.
 #[derive(Debug, Clone, Copy)]
@@ -45,6 +45,7 @@ pub struct Observed {
 /// The machine.
 #[derive(Debug, Clone, Copy)]
 pub struct Sequence {
+    rates: Rates,
     state: State,
     fault: Option<Fault>,
     profile: Option<Profile>,
@@ -55,9 +56,12 @@ pub struct Sequence {
     held_demand: f32,
 }
 
-impl Default for Sequence {
-    fn default() -> Self {
+impl Sequence {
+    /// Idle.
+    #[must_use]
+    pub const fn new(rates: Rates) -> Self {
         Self {
+            rates,
             state: State::Idle,
             fault: None,
             profile: None,
@@ -68,9 +72,7 @@ impl Default for Sequence {
             held_demand: 0.0,
         }
     }
-}
 
-impl Sequence {
     /// Where it is.
     pub fn state(&self) -> State {
         self.state
@@ -157,7 +159,7 @@ impl Sequence {
         self.rolling_samples = if rolls { self.rolling_samples + 1 } else { 0 };
         let slow = observed.vehicle_speed_m_s < LOCK_SPEED_M_S;
         let Some(profile) = self.profile.filter(|_| self.state > State::Armed) else {
-            if self.state == State::Armed && (observed.stop || self.samples > ARMED_SAMPLES)
+            if self.state == State::Armed && (observed.stop || self.lasts(ARMED_MS))
                 || self.state == State::Done && observed.stop
             {
                 self.enter(State::Idle);
@@ -169,15 +171,15 @@ impl Sequence {
                 if observed.stop {
                     self.enter(State::Idle);
                 } else if observed.vehicle_speed_m_s >= profile.start_speed_m_s
-                    && self.rolling_samples >= ROLLING_SAMPLES_BEFORE_RAMP
+                    && self.rolling_samples >= self.rates.samples(ROLLING_MS_BEFORE_RAMP)
                 {
                     self.enter(State::Ramp);
-                } else if self.samples > SPIN_UP_SAMPLES {
+                } else if self.lasts(SPIN_UP_MS) {
                     self.timed_out = true;
                 }
             }
             State::Ramp => {
-                let into_s = nearest(self.samples) * SAMPLE_S;
+                let into_s = self.seconds();
                 let demand = match &profile.program {
                     Program::Ramp { demand_per_s } => Some((demand_per_s * into_s).min(1.0))
                         .filter(|_| into_s * demand_per_s < 1.5),
@@ -210,28 +212,24 @@ impl Sequence {
             }
             State::Skid => {
                 let unknown = observed.slip_ratio.is_none();
-                if observed.stop
-                    || slow
-                    || unknown
-                    || nearest(self.samples) * SAMPLE_S > profile.skid_hold_s
-                {
+                if observed.stop || slow || unknown || self.seconds() > profile.skid_hold_s {
                     self.enter(State::Release);
                 } else {
                     return self.held_demand;
                 }
             }
             State::Release => {
-                if slow || self.rolling_samples >= ROLLING_SAMPLES_AFTER_RELEASE {
+                if slow || self.rolling_samples >= self.rates.samples(ROLLING_MS_AFTER_RELEASE) {
                     self.applications = self.applications.saturating_add(1);
                     self.enter(State::Cool);
-                } else if self.samples > RELEASE_SAMPLES {
+                } else if self.lasts(RELEASE_MS) {
                     self.timed_out = true;
                 }
             }
             State::Cool => {
                 if observed.stop {
                     self.enter(State::Done);
-                } else if nearest(self.samples) * SAMPLE_S >= profile.cool_s {
+                } else if self.seconds() >= profile.cool_s {
                     if self.applications < profile.applications {
                         self.enter(State::SpinUp);
                     } else {
@@ -247,6 +245,16 @@ impl Sequence {
             State::Idle | State::Armed | State::Fault => {}
         }
         0.0
+    }
+
+    /// Seconds in this state.
+    fn seconds(&self) -> f32 {
+        nearest(self.samples) * self.rates.sample_s()
+    }
+
+    /// Whether this state has lasted longer than so many ms.
+    fn lasts(&self, ms: u32) -> bool {
+        self.samples > self.rates.samples(ms)
     }
 
     fn enter(&mut self, state: State) {

@@ -13,7 +13,7 @@ use muslip_quarter_car::filter::{self, Channel, Filter, Measurement, Road, State
 use muslip_quarter_car::slip_control::{self, SlipController};
 use muslip_record::{Parameters, QuarterCar};
 
-use crate::SAMPLE_S;
+use crate::rates::Rates;
 
 /// Standard gravity in m/s2 (3rd General Conference on Weights and Measures, 1901).
 const GRAVITY_M_S2: f32 = 9.806_65;
@@ -26,7 +26,7 @@ const VEHICLE_STD_M_S: f32 = 0.01;
 /// Standard deviation of the normal force as a share of it.
 const NORMAL_STD: f32 = 0.01;
 
-/// Readings of one channel left out, less those taken, from which the filter has lost it: after 75 ms where one in six
+/// Readings of one channel left out, less those taken, from which the filter has lost it: after 75 samples where one in six
 /// is taken because five before it were not.
 const LOST_READINGS: u8 = 50;
 
@@ -74,7 +74,9 @@ impl SlipHold {
         parameters: &Parameters,
         target_slip: f32,
         sample: &RigSample<f32>,
+        rates: Rates,
     ) -> Result<Self, Refused> {
+        let sample_s = rates.sample_s();
         let wheel = &parameters.wheel;
         let control = &parameters.slip_control;
         let vehicle = Vehicle {
@@ -84,11 +86,11 @@ impl SlipHold {
         };
         let tuned = filter::Config::tuned(vehicle, Road::Unknown, sample.vehicle_speed_m_s);
         let filter = filter::Config {
-            sample_time_s: SAMPLE_S,
+            sample_time_s: sample_s,
             initial_mass_kg: sample.normal_force_n / GRAVITY_M_S2,
             process_std: StateStd {
                 // The model's deceleration where the speed is held: friction of 1 for a sample.
-                vehicle_speed_m_s: 2.0 * SAMPLE_S * GRAVITY_M_S2,
+                vehicle_speed_m_s: 2.0 * sample_s * GRAVITY_M_S2,
                 slip_ratio: 0.002,
                 friction: 0.01,
                 ..tuned.process_std
@@ -101,7 +103,7 @@ impl SlipHold {
             setpoint_slip: target_slip,
             bandwidth_rad_s: control.bandwidth_rad_s,
             integral_time_s: control.integral_time_s,
-            sample_time_s: SAMPLE_S,
+            sample_time_s: sample_s,
             radius_m: wheel.effective_radius_m,
             inertia_kg_m2: wheel.inertia_kg_m2,
             maximum_torque_nm: parameters.brake.torque_at_full_nm,
@@ -191,6 +193,8 @@ impl SlipHold {
 mod tests {
     use super::*;
 
+    const RATES: Rates = Rates::new(1_000, 84_000_000);
+
     /// A wheel on a drum whose speed is held, braked as the hold demands, on a road of peak 0.85 at slip 0.14.
     struct Wheel {
         hold: SlipHold,
@@ -201,7 +205,8 @@ mod tests {
     impl Wheel {
         fn rolling() -> Self {
             let mut wheel = Self {
-                hold: SlipHold::new(&Parameters::default(), 0.1, &Self::at(0.0, 0.0)).unwrap(),
+                hold: SlipHold::new(&Parameters::default(), 0.1, &Self::at(0.0, 0.0), RATES)
+                    .unwrap(),
                 speed_rad_s: 20.0 / 0.31,
                 slip_ratio: 0.0,
             };
@@ -233,7 +238,7 @@ mod tests {
             let demand = self
                 .hold
                 .step(&Self::at(self.slip_ratio, drag_n + wrong_n))?;
-            self.speed_rad_s += SAMPLE_S * (0.31 * drag_n - 2000.0 * demand) / 1.25;
+            self.speed_rad_s += RATES.sample_s() * (0.31 * drag_n - 2000.0 * demand) / 1.25;
             Ok(())
         }
     }

@@ -1,17 +1,32 @@
 //! The emergency stop: two channels that must agree, and a proof that it works before arming.
 
-/// Samples for which the channels may differ: contacts never part at once.
-pub const DIFFERING_SAMPLES: u8 = 100;
+use crate::rates::Rates;
+
+/// How long in ms the channels may differ: contacts never part at once.
+pub const DIFFERING_MS: u32 = 100;
 
 /// What both channels have said since the start.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy)]
 pub struct EmergencyStop {
-    differing: u8,
+    /// Samples for which they may differ, and have.
+    tolerated: u32,
+    differing: u32,
     seen_open: bool,
     proven: bool,
 }
 
 impl EmergencyStop {
+    /// Nothing seen yet.
+    #[must_use]
+    pub const fn new(rates: Rates) -> Self {
+        Self {
+            tolerated: rates.samples(DIFFERING_MS),
+            differing: 0,
+            seen_open: false,
+            proven: false,
+        }
+    }
+
     /// Takes what the channels say at a sample: which are open.
     pub fn update(&mut self, open: [bool; 2]) {
         let [a, b] = open;
@@ -31,7 +46,7 @@ impl EmergencyStop {
 
     /// Whether the channels have differed for too long: a contact is welded, or a wire is broken.
     pub fn disagrees(&self) -> bool {
-        self.differing > DIFFERING_SAMPLES
+        self.differing > self.tolerated
     }
 
     /// Whether both have been seen to open and to close again since the start.
@@ -45,7 +60,7 @@ mod tests {
     use super::*;
 
     fn after(samples: &[([bool; 2], u32)]) -> EmergencyStop {
-        let mut stop = EmergencyStop::default();
+        let mut stop = EmergencyStop::new(Rates::new(1_000, 84_000_000));
         for &(open, times) in samples {
             for _ in 0..times {
                 stop.update(open);

@@ -11,14 +11,13 @@ use crate::interlock::{LOCK_SPEED_M_S, wheel_change_rad_s2};
 /// # Errors
 /// That number.
 pub fn parameters(p: &Parameters) -> Result<(), u8> {
-    let positive = |value: f32| value > 0.0 && value.is_finite();
     let pulses = |pulses: u16| (1..=10_000).contains(&pulses);
     let scale = |scale: f32| ceiling::NEWTON_PER_CODE.allows(scale.abs());
     let code = |code: i32| code.unsigned_abs() < 1 << 23;
     let checks = [
         ceiling::EFFECTIVE_RADIUS_M.allows(p.wheel.effective_radius_m),
         ceiling::INERTIA_KG_M2.allows(p.wheel.inertia_kg_m2),
-        positive(p.wheel.vehicle_mass_kg),
+        ceiling::VEHICLE_MASS_KG.allows(p.wheel.vehicle_mass_kg),
         pulses(p.wheel_encoder.pulses_per_revolution),
         true,
         pulses(p.vehicle_encoder.pulses_per_revolution),
@@ -39,16 +38,20 @@ pub fn parameters(p: &Parameters) -> Result<(), u8> {
             && ceiling::WHEEL_CHANGE_RAD_S2.allows(wheel_change_rad_s2(p)),
         ceiling::MINIMUM_SUPPLY_V.allows(p.limits.minimum_supply_v),
         true,
-        positive(p.estimator.friction_std),
-        positive(p.estimator.noise_inflation),
+        ceiling::FRICTION_STD.allows(p.estimator.friction_std),
+        ceiling::NOISE_INFLATION.allows(p.estimator.noise_inflation),
         p.estimator.skid_slip_minimum >= 0.0,
         p.estimator.skid_slip_maximum > p.estimator.skid_slip_minimum
             && p.estimator.skid_slip_maximum <= 1.05,
-        positive(p.slip_control.bandwidth_rad_s),
-        positive(p.slip_control.integral_time_s),
-        positive(p.slip_control.maximum_torque_rate_nm_s),
+        ceiling::BANDWIDTH_RAD_S.allows(p.slip_control.bandwidth_rad_s),
+        ceiling::INTEGRAL_TIME_S.allows(p.slip_control.integral_time_s),
+        ceiling::TORQUE_RATE_NM_S.allows(p.slip_control.maximum_torque_rate_nm_s),
         ceiling::BRAKE_ENERGY_J.allows(p.brake_heat.maximum_energy_j),
         ceiling::COOLING_TIME_S.allows(p.brake_heat.cooling_time_s),
+        ceiling::VOLT_AT_ZERO.allows(p.pressure.volt_at_zero),
+        ceiling::VOLT_AT_FULL.allows(p.pressure.volt_at_full)
+            && p.pressure.volt_at_full >= p.pressure.volt_at_zero + LEAST_PRESSURE_SPAN_V,
+        ceiling::RESPONSE_S.allows(p.pressure.response_s),
     ];
     match (0..).zip(checks).find(|(_, good)| !good) {
         Some((number, _)) => Err(number),
@@ -58,7 +61,10 @@ pub fn parameters(p: &Parameters) -> Result<(), u8> {
 }
 
 /// Number of the first effect that can be compensated among the parameters.
-const COMPENSATION_FIELD: u8 = 30;
+const COMPENSATION_FIELD: u8 = 33;
+
+/// Least difference in V between the pressure transmitter's ends: with less its noise would be a pressure.
+const LEAST_PRESSURE_SPAN_V: f32 = 0.5;
 
 /// Whether every field of a profile is within its range.
 pub fn profile(profile: &Profile) -> bool {
@@ -92,6 +98,35 @@ pub fn profile(profile: &Profile) -> bool {
 mod tests {
     use super::*;
 
+    type Set = fn(&mut Parameters, f32);
+
+    fn with(set: Set, value: f32) -> Parameters {
+        let mut changed = Parameters::default();
+        set(&mut changed, value);
+        changed
+    }
+
+    /// Nothing beyond either end of a range is taken.
+    fn refused_beyond(ranges: &[(u8, ceiling::Ceiling, Set)]) {
+        for &(field, range, set) in ranges {
+            for value in [
+                range.lowest * 0.99,
+                range.highest * 1.01,
+                0.0,
+                1e30,
+                f32::INFINITY,
+                f32::NAN,
+            ] {
+                assert_eq!(
+                    parameters(&with(set, value)),
+                    Err(field),
+                    "{} {value}",
+                    range.parameter
+                );
+            }
+        }
+    }
+
     #[test]
     fn defaults_pass_and_the_first_bad_field_is_named() {
         let good = Parameters::default();
@@ -118,8 +153,7 @@ mod tests {
 
     #[test]
     fn no_limit_that_an_interlock_uses_can_be_set_so_that_it_never_fires() {
-        type Set = fn(&mut Parameters, f32);
-        let limits: [(u8, ceiling::Ceiling, Set); 13] = [
+        let limits: [(u8, ceiling::Ceiling, Set); 16] = [
             (0, ceiling::EFFECTIVE_RADIUS_M, |p, v| {
                 p.wheel.effective_radius_m = v;
             }),
@@ -157,30 +191,54 @@ mod tests {
             (29, ceiling::COOLING_TIME_S, |p, v| {
                 p.brake_heat.cooling_time_s = v;
             }),
+            (30, ceiling::VOLT_AT_ZERO, |p, v| {
+                p.pressure.volt_at_zero = v;
+            }),
+            (31, ceiling::VOLT_AT_FULL, |p, v| {
+                p.pressure.volt_at_full = v;
+            }),
+            (32, ceiling::RESPONSE_S, |p, v| p.pressure.response_s = v),
         ];
-        for (field, limit, set) in limits {
-            for value in [
-                limit.lowest * 0.99,
-                limit.highest * 1.01,
-                0.0,
-                1e30,
-                f32::INFINITY,
-                f32::NAN,
-            ] {
-                let mut changed = Parameters::default();
-                set(&mut changed, value);
-                assert_eq!(
-                    parameters(&changed),
-                    Err(field),
-                    "{} {value}",
-                    limit.parameter
-                );
-            }
-        }
+        refused_beyond(&limits);
         // Each within its range, and together a wheel that stops in a millisecond.
         let mut together = Parameters::default();
         together.wheel.inertia_kg_m2 = 0.05;
         assert_eq!(parameters(&together), Err(18));
+        // And a transmitter whose whole range is noise.
+        let mut narrow = Parameters::default();
+        (narrow.pressure.volt_at_zero, narrow.pressure.volt_at_full) = (0.9, 1.39);
+        assert_eq!(parameters(&narrow), Err(31));
+    }
+
+    #[test]
+    fn nothing_that_a_filter_or_the_slip_loop_reckons_with_can_be_set_so_that_it_cannot() {
+        let ranges: [(u8, ceiling::Ceiling, Set); 6] = [
+            (2, ceiling::VEHICLE_MASS_KG, |p, v| {
+                p.wheel.vehicle_mass_kg = v;
+            }),
+            (21, ceiling::FRICTION_STD, |p, v| {
+                p.estimator.friction_std = v;
+            }),
+            (22, ceiling::NOISE_INFLATION, |p, v| {
+                p.estimator.noise_inflation = v;
+            }),
+            (25, ceiling::BANDWIDTH_RAD_S, |p, v| {
+                p.slip_control.bandwidth_rad_s = v;
+            }),
+            (26, ceiling::INTEGRAL_TIME_S, |p, v| {
+                p.slip_control.integral_time_s = v;
+            }),
+            (27, ceiling::TORQUE_RATE_NM_S, |p, v| {
+                p.slip_control.maximum_torque_rate_nm_s = v;
+            }),
+        ];
+        assert_eq!(ranges.len(), ceiling::RANGES.len());
+        refused_beyond(&ranges);
+        for (_, range, set) in ranges {
+            for end in [range.lowest, range.highest] {
+                assert_eq!(parameters(&with(set, end)), Ok(()), "{}", range.parameter);
+            }
+        }
     }
 
     #[test]

@@ -6,7 +6,7 @@ use std::cell::RefCell;
 use embedded_hal::spi::{ErrorKind, Operation, SpiDevice};
 use embedded_hal_mock::eh1::spi::{Mock, Transaction};
 use muslip_control::ads131m02::{
-    AdcError, Ads131m02, ChannelConfig, Conversions, Gain, SET_UP_STEPS,
+    AdcError, Ads131m02, ChannelConfig, Conversions, Gain, Oversampling, SET_UP_STEPS,
 };
 
 /// CRC-16 bit by bit: polynomial 0x1021, seed 0xFFFF, as the data sheet has it.
@@ -60,7 +60,7 @@ fn with_bus<T>(
 ) -> T {
     let transactions: Vec<_> = frames.into_iter().flatten().collect();
     let mut spi = Mock::new(&transactions);
-    let mut adc = Ads131m02::new(spi.clone());
+    let mut adc = Ads131m02::new(spi.clone(), Oversampling::X2048);
     let result = work(&mut adc);
     spi.done();
     result
@@ -186,7 +186,7 @@ fn a_wrong_checksum_a_silent_bus_a_reset_and_a_changed_register_are_errors() {
     assert_eq!(read(STATUS | 1 << 10, 0x0510), Err(AdcError::Reset));
     assert_eq!(read(STATUS, 0x0111), Err(AdcError::NotWritten(2)));
     assert_eq!(
-        Ads131m02::new(Broken).read(),
+        Ads131m02::new(Broken, Oversampling::X2048).read(),
         Err(AdcError::Spi(ErrorKind::Overrun))
     );
 }
@@ -335,7 +335,7 @@ fn read_on(
 fn a_converter_that_resets_itself_or_loses_a_register_is_set_up_again_while_it_is_read() {
     let still = |_: f64| 0.5;
     let converter = RefCell::new(Converter::new(&still));
-    let mut adc = Ads131m02::new(Bus(&converter));
+    let mut adc = Ads131m02::new(Bus(&converter), Oversampling::X2048);
     assert_eq!(adc.configure([ChannelConfig::default(); 2]), Ok(()));
     let set_up = converter.borrow().registers;
     assert_eq!(set_up[4], 0x0066);
@@ -376,7 +376,7 @@ fn what_folds_onto_a_force_at_1_khz_is_filtered_out() {
     let left = |hz: f64| {
         let tone = move |s: f64| (core::f64::consts::TAU * hz * s + 0.3).sin();
         let converter = RefCell::new(Converter::new(&tone));
-        let mut adc = Ads131m02::new(Bus(&converter));
+        let mut adc = Ads131m02::new(Bus(&converter), Oversampling::X2048);
         adc.configure([ChannelConfig::default(); 2]).unwrap();
         let codes = read_on(&mut adc, &converter, 60);
         codes[10..]

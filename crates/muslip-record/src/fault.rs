@@ -4,7 +4,7 @@ use crate::{End, Fault, State};
 
 impl Fault {
     /// In the order of their numbers, which is the order in which they are named.
-    pub const ALL: [Self; 23] = [
+    pub const ALL: [Self; 25] = [
         Self::EmergencyStop,
         Self::WheelLocked,
         Self::Overspeed,
@@ -28,6 +28,8 @@ impl Fault {
         Self::DumpOutput,
         Self::SpeedsDisagree,
         Self::BrakeHot,
+        Self::PressureLost,
+        Self::PressureWrong,
     ];
 }
 

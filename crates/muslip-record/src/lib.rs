@@ -58,7 +58,8 @@ pub use frame::{BODY_BYTES, EncodeError, FRAME_BYTES, FrameError, FrameReader, e
 pub use hash::{PARAMETERS_HASH, SCHEMA_HASH};
 pub use parameters::{
     BrakeParameters, EncoderParameters, EstimatorParameters, ForceParameters, HeatParameters,
-    LimitParameters, Parameters, SlipControlParameters, TyreRange, WheelParameters,
+    LimitParameters, Parameters, PressureParameters, SlipControlParameters, TyreRange,
+    WheelParameters,
 };
 pub use wire::{
     Answer, Command, End, Envelope, Estimate, Event, Fault, Hello, LinkCounters, Origin,

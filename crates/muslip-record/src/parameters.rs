@@ -31,6 +31,8 @@ pub struct Parameters {
     pub slip_control: SlipControlParameters,
     /// Heat of the brake.
     pub brake_heat: HeatParameters,
+    /// Pressure of the brake's line.
+    pub pressure: PressureParameters,
     /// What a diagnosis found, for the estimate; nothing in a file without it.
     #[serde(default)]
     pub compensation: CompensationParameters,
@@ -43,7 +45,7 @@ pub struct WheelParameters {
     pub effective_radius_m: f32,
     /// Moment of inertia J about the axle in kg m2, 0.0001..=10,000.
     pub inertia_kg_m2: f32,
-    /// Translating mass m in kg (a drum's inertia over its radius squared), > 0.
+    /// Translating mass m in kg (a drum's inertia over its radius squared), 0.1..=1,000,000.
     pub vehicle_mass_kg: f32,
 }
 
@@ -106,9 +108,9 @@ pub enum TyreRange {
 pub struct EstimatorParameters {
     /// Where it starts.
     pub tyre_range: TyreRange,
-    /// Standard deviation of one sample's friction, > 0.
+    /// Standard deviation of one sample's friction, 0.001..=1.
     pub friction_std: f32,
-    /// Factor on it where the article's filter runs, > 0; 3 by default. The efficient estimator learns the noise.
+    /// Factor on it where the article's filter runs, 1..=100; 3 by default. The efficient estimator learns the noise.
     pub noise_inflation: f32,
     /// Smallest slip that is given to the estimator, 0..1.
     pub skid_slip_minimum: f32,
@@ -119,11 +121,11 @@ pub struct EstimatorParameters {
 /// Slip control.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct SlipControlParameters {
-    /// Bandwidth of the slip loop in rad/s, > 0.
+    /// Bandwidth of the slip loop in rad/s, 0.1..=1,000.
     pub bandwidth_rad_s: f32,
-    /// Integral time in s, > 0.
+    /// Integral time in s, 0.001..=100.
     pub integral_time_s: f32,
-    /// Fastest change of the brake torque in N m/s, > 0.
+    /// Fastest change of the brake torque in N m/s, 1..=100,000,000.
     pub maximum_torque_rate_nm_s: f32,
 }
 
@@ -134,6 +136,17 @@ pub struct HeatParameters {
     pub maximum_energy_j: f32,
     /// Time in s after which 1/e of it is left, 1..=3,600.
     pub cooling_time_s: f32,
+}
+
+/// The transmitter of the brake line's pressure, as its voltage at the controller's pin, and how fast the line follows.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct PressureParameters {
+    /// Volt without pressure, 0.1..=1: one that reads less than half of it is broken.
+    pub volt_at_zero: f32,
+    /// Volt at full pressure, 0.5 above the one before, at most 3.1.
+    pub volt_at_full: f32,
+    /// Time in s within which the line goes from no pressure to full and back, 0.01..=1.
+    pub response_s: f32,
 }
 
 impl Default for Parameters {
@@ -191,6 +204,12 @@ impl Default for Parameters {
             brake_heat: HeatParameters {
                 maximum_energy_j: 1_800_000.0,
                 cooling_time_s: 120.0,
+            },
+            // 0.5 to 4.5 V behind a divider of 3 : 2.
+            pressure: PressureParameters {
+                volt_at_zero: 0.333,
+                volt_at_full: 3.0,
+                response_s: 0.2,
             },
             compensation: CompensationParameters::default(),
         }

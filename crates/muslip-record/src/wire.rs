@@ -284,6 +284,10 @@ pub enum Fault {
     SpeedsDisagree,
     /// The brake has taken up more energy than it bears.
     BrakeHot,
+    /// The transmitter of the brake line's pressure reads what it never can.
+    PressureLost,
+    /// The brake line's pressure is not what the valves were told.
+    PressureWrong,
 }
 
 /// Something that happened.

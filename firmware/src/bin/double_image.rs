@@ -5,7 +5,7 @@
 #[cfg(target_os = "none")]
 #[cortex_m_rt::entry]
 fn main() -> ! {
-    let started = firmware::board::start();
+    let started = firmware::stm32f405::start();
     let factor = core::hint::black_box(1.5_f64);
     core::hint::black_box(factor * core::hint::black_box(2.0));
     firmware::run::run(started)

@@ -27,7 +27,7 @@ static HEAP: Full = Full;
 #[cfg(target_os = "none")]
 #[cortex_m_rt::entry]
 fn main() -> ! {
-    let started = firmware::board::start();
+    let started = firmware::stm32f405::start();
     core::hint::black_box(alloc::boxed::Box::new(core::hint::black_box(1_u32)));
     firmware::run::run(started)
 }

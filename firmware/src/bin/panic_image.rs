@@ -8,7 +8,7 @@ fn main() -> ! {
     use muslip_control::board::{Actuators, Board};
     use muslip_control::brake::BrakeOutput;
 
-    let (_, mut actuators) = firmware::board::start().board.split();
+    let (_, mut actuators) = firmware::stm32f405::start().board.split();
     actuators.actuate(BrakeOutput {
         valve_duty: 30_000,
         hold_pressure: true,

@@ -1,16 +1,14 @@
 //! The controller natively: what the image must equal.
 
-use std::collections::VecDeque;
-
 use anyhow::{Result, anyhow};
 use muslip_control::board::{Actuators, NotStored};
 use muslip_control::brake::BrakeOutput;
 use muslip_control::controller::{Controller, Identity};
 use muslip_control::emulation::Delays;
-use muslip_control::link::Transmit;
 use muslip_record::{Origin, Parameters};
+use test_support::MemoryPort;
 
-use crate::target::{Input, Output, Target};
+use crate::target::{Input, Output, RATES, Target};
 
 /// Bytes that the image's transmit queue holds.
 const QUEUE_BYTES: usize = 2047;
@@ -21,22 +19,8 @@ const CYCLES_PER_SAMPLE: u32 = 168_000;
 /// The controller on a board of memory.
 pub struct Native {
     controller: Controller,
-    /// What has arrived and was not looked at yet, as the image's interrupt keeps it.
-    received: VecDeque<u8>,
-    transmit: Queue,
-}
-
-#[derive(Default)]
-struct Queue(VecDeque<u8>);
-
-impl Transmit for Queue {
-    fn room(&self) -> usize {
-        QUEUE_BYTES - self.0.len()
-    }
-
-    fn send(&mut self, bytes: &[u8]) {
-        self.0.extend(bytes);
-    }
+    /// The link's bytes, as the image's interrupt keeps them.
+    port: MemoryPort,
 }
 
 /// As in the emulator: nothing can be stored.
@@ -57,6 +41,7 @@ impl Native {
     /// The default parameters are refused.
     pub fn new() -> Result<Self> {
         let identity = Identity {
+            rates: RATES,
             core_clock_hz: 168_000_000,
             emulated: true,
             watchdog_reset: false,
@@ -71,8 +56,7 @@ impl Native {
             .map_err(|error| anyhow!("default parameters: {error:?}"))?;
         Ok(Self {
             controller,
-            received: VecDeque::new(),
-            transmit: Queue::default(),
+            port: MemoryPort::new(QUEUE_BYTES),
         })
     }
 }
@@ -80,21 +64,16 @@ impl Native {
 impl Target for Native {
     fn sample(&mut self, input: &Input<'_>) -> Result<Output> {
         let brake = self.controller.control(&input.raw);
-        self.received.extend(input.link);
-        let Self {
-            controller,
-            received,
-            transmit,
-        } = self;
-        controller.communicate(|| received.pop_front(), transmit, &mut NoStore);
+        self.port.incoming.extend(input.link);
+        self.controller.communicate(&mut self.port, &mut NoStore);
         // What the image finds out by counting.
         if input.burn > CYCLES_PER_SAMPLE {
             self.controller.overran();
         }
-        let sent = usize::from(input.room).min(self.transmit.0.len());
+        let sent = usize::from(input.room).min(self.port.outgoing.len());
         Ok(Output {
             brake,
-            link: self.transmit.0.drain(..sent).collect(),
+            link: self.port.outgoing.drain(..sent).collect(),
             instructions: [0; 3],
             delays: Delays::default(),
             stack_bytes: 0,

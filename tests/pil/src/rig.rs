@@ -2,13 +2,14 @@
 
 use anyhow::{Result, anyhow};
 use host_sim::{Plant, PlantParameters, RigLaw};
-use muslip_control::EDGE_TIMER_HZ;
 use muslip_control::board::{BridgeQuality, BridgeReading, EncoderReading, RawSample};
 use muslip_control::brake::BrakeOutput;
 use muslip_record::Parameters;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
+
+use crate::target::RATES;
 
 /// Steps of the simulator in a sample.
 const STEPS: u32 = 10;
@@ -47,12 +48,18 @@ pub struct Trouble {
     pub drag_stuck: bool,
     /// The drag's contact opens on every other sample.
     pub drag_chatters: bool,
+    /// The drag reads wrong by so many N, on every other sample in the other direction.
+    pub drag_swings_n: f64,
     /// Drag in N added by a broken bridge.
     pub drag_offset_n: f64,
     /// The tyre is lifted.
     pub lifted: bool,
     /// Supply in V instead of 24.
     pub supply_v: Option<f64>,
+    /// What the pressure transmitter reads in V.
+    pub pressure_v: Option<f64>,
+    /// Both valves stay as they are, and so does the pressure.
+    pub valves_stuck: bool,
     /// The brake holds this torque in N m whatever the valves do.
     pub stuck_brake_nm: Option<f64>,
     /// The drum is driven to this speed in m/s.
@@ -117,7 +124,7 @@ impl Encoder {
     }
 
     fn reading(&self, now_s: f64) -> EncoderReading {
-        let ticks = |s: f64| (s * f64::from(EDGE_TIMER_HZ)) as u64;
+        let ticks = |s: f64| (s * f64::from(RATES.edge_timer_hz())) as u64;
         EncoderReading {
             edges: (self.counted as u64 * 2 + 1) as u16,
             edge_ticks: ticks(self.capture_s) as u32,
@@ -191,7 +198,9 @@ impl Rig {
             self.normal_force_n
         };
         for step in 0..STEPS {
-            self.torque_nm = demand_nm + (self.torque_nm - demand_nm) * (-step_s / lag_s).exp();
+            if !trouble.valves_stuck {
+                self.torque_nm = demand_nm + (self.torque_nm - demand_nm) * (-step_s / lag_s).exp();
+            }
             let torque_nm = trouble.stuck_brake_nm.unwrap_or(self.torque_nm);
             self.plant.step(step_s, torque_nm, normal_force_n.max(1.0));
             let now_s = self.samples as f64 * SAMPLE_S + f64::from(step + 1) * step_s;
@@ -222,6 +231,17 @@ impl Rig {
         self.demand_nm(brake) * self.plant.state().wheel_speed_rad_s
     }
 
+    /// What the transmitter reads in V where nothing is wrong with it: torque goes with pressure.
+    fn pressure_v(&self) -> f64 {
+        let pressure = &self.parameters.pressure;
+        let (zero, full) = (
+            f64::from(pressure.volt_at_zero),
+            f64::from(pressure.volt_at_full),
+        );
+        let share = self.torque_nm / f64::from(self.parameters.brake.torque_at_full_nm);
+        zero + (full - zero) * share
+    }
+
     fn demand_nm(&self, brake: BrakeOutput) -> f64 {
         if !brake.hold_pressure {
             return 0.0;
@@ -246,10 +266,11 @@ impl Rig {
             .drag_n
             .unwrap_or_else(|| self.plant.drag_n(&contact))
             + self.trouble.drag_offset_n
-            + if self.trouble.drag_chatters && self.samples.is_multiple_of(2) {
-                10_000.0
+            + if self.samples.is_multiple_of(2) {
+                let chatter_n = f64::from(u8::from(self.trouble.drag_chatters)) * 10_000.0;
+                chatter_n + self.trouble.drag_swings_n
             } else {
-                0.0
+                -self.trouble.drag_swings_n
             }
             + noise(DRAG_NOISE_N);
         let normal_n = normal_force_n + noise(NORMAL_NOISE_N);
@@ -276,6 +297,8 @@ impl Rig {
             vehicle: self.vehicle.reading(now_s),
             bridge: self.bridge,
             supply_mv: (self.trouble.supply_v.unwrap_or(24.0) * 1000.0) as u16,
+            pressure_mv: (self.trouble.pressure_v.unwrap_or_else(|| self.pressure_v()) * 1000.0)
+                as u16,
             // Somebody tests it when the rig is switched on.
             emergency_stop: if (2..5).contains(&self.samples) {
                 [true; 2]
@@ -298,7 +321,7 @@ mod tests {
     fn the_controllers_own_conversion_reads_the_plants_speeds_and_forces_back() {
         let parameters = Parameters::default();
         let mut rig = Rig::rolling("rudd:0.85,0.14", 20.0, 1, &parameters).unwrap();
-        let mut conversion = Conversion::new(&parameters);
+        let mut conversion = Conversion::new(&parameters, RATES);
         let brake = BrakeOutput::for_demand(0.25, &parameters.brake);
         let mut drag = 0.0;
         for index in 0..600 {

@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 
 use anyhow::Result;
 use muslip_control::brake::BrakeOutput;
-use muslip_control::interlock::SILENT_SAMPLES;
+use muslip_control::interlock::SILENT_MS;
 use muslip_record::{Command, Envelope, FRAME_BYTES, Parameters, encode};
 
 use crate::bench::WIRE_BYTES;
@@ -49,7 +49,7 @@ pub struct Pace {
 }
 
 /// Silence that a server which waits lets pass, in samples.
-const PATIENCE_SAMPLES: u32 = SILENT_SAMPLES - 50;
+const PATIENCE_SAMPLES: u32 = SILENT_MS - 50;
 
 /// Samples for a client until it leaves or `stop` is set.
 ///

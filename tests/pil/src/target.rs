@@ -4,6 +4,11 @@ use anyhow::Result;
 use muslip_control::board::RawSample;
 use muslip_control::brake::BrakeOutput;
 use muslip_control::emulation::Delays;
+use muslip_control::rates::Rates;
+use muslip_record::SAMPLE_RATE_HZ;
+
+/// Rates of the board that the image is for.
+pub const RATES: Rates = Rates::new(SAMPLE_RATE_HZ, 84_000_000);
 
 /// One sample's input beside the sensors.
 #[derive(Debug, Clone, Copy)]

@@ -3,16 +3,36 @@
 
 use std::fmt::Write;
 
-use muslip_control::ceiling::CEILINGS;
+use muslip_control::ceiling::{CEILINGS, Ceiling, RANGES};
 
 const PAGE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/rig.md");
-const MARKS: [&str; 2] = ["<!-- ceilings -->\n", "<!-- end of ceilings -->"];
 
-fn table() -> String {
-    let mut table = String::from(
-        "| parameter | from | to | unit | beyond it would never fire |\n| --- | --- | --- | --- | --- |\n",
+/// A table of the page: its marks, its last column, and what is in it.
+struct Printed {
+    marks: [&'static str; 2],
+    beyond: &'static str,
+    ranges: &'static [Ceiling],
+}
+
+const TABLES: [Printed; 2] = [
+    Printed {
+        marks: ["<!-- ceilings -->\n", "<!-- end of ceilings -->"],
+        beyond: "beyond it would never fire",
+        ranges: &CEILINGS,
+    },
+    Printed {
+        marks: ["<!-- ranges -->\n", "<!-- end of ranges -->"],
+        beyond: "beyond it would end a run",
+        ranges: &RANGES,
+    },
+];
+
+fn table(printed: &Printed) -> String {
+    let mut table = format!(
+        "| parameter | from | to | unit | {} |\n| --- | --- | --- | --- | --- |\n",
+        printed.beyond
     );
-    for ceiling in CEILINGS {
+    for ceiling in printed.ranges {
         let interlocks: Vec<String> = ceiling
             .interlock
             .split(", ")
@@ -33,18 +53,20 @@ fn table() -> String {
 }
 
 #[test]
-fn the_ceilings_of_the_parameters_are_those_of_the_controller() {
-    let page = std::fs::read_to_string(PAGE).unwrap();
-    let (before, rest) = page.split_once(MARKS[0]).unwrap();
-    let (printed, after) = rest.split_once(MARKS[1]).unwrap();
-    if std::env::var_os("MUSLIP_BLESS").is_some() {
-        let new = format!("{before}{}{}{}{after}", MARKS[0], table(), MARKS[1]);
-        std::fs::write(PAGE, new).unwrap();
-        return;
+fn the_ranges_of_the_parameters_are_those_of_the_controller() {
+    for printed in &TABLES {
+        let page = std::fs::read_to_string(PAGE).unwrap();
+        let [start, end] = printed.marks;
+        let (before, rest) = page.split_once(start).unwrap();
+        let (found, after) = rest.split_once(end).unwrap();
+        let table = table(printed);
+        if std::env::var_os("MUSLIP_BLESS").is_some() {
+            std::fs::write(PAGE, format!("{before}{start}{table}{end}{after}")).unwrap();
+            continue;
+        }
+        assert_eq!(
+            found, table,
+            "MUSLIP_BLESS=1 cargo test -p pil --test rig_page writes it anew"
+        );
     }
-    assert_eq!(
-        printed,
-        table(),
-        "MUSLIP_BLESS=1 cargo test -p pil --test rig_page writes it anew"
-    );
 }

@@ -167,7 +167,7 @@ pub(super) fn run(arguments: &Arguments, terminal: &mut Terminal) -> Result<(), 
             terminal.line(text.trim_end())
         }
         Action::Run(run) => match profile {
-            Some(profile) => record(run, profile, &mut session, terminal),
+            Some(profile) => record(run, profile, hello.sample_rate_hz, &mut session, terminal),
             None => Ok(()),
         },
     }
@@ -355,13 +355,14 @@ fn standing(bits: u32) -> String {
 fn record(
     run: &Run,
     profile: Profile,
+    sample_rate_hz: u32,
     session: &mut Session,
     terminal: &mut Terminal,
 ) -> Result<(), Failure> {
     let origin = vec![format!("recorded: muslip rig run, {profile:?}")];
     session.ask("arm", Command::Arm, |_| {})?;
     session.ask("start", Command::Start { profile }, |_| {})?;
-    let mut recorder = Recorder::create(&run.out, &origin)?;
+    let mut recorder = Recorder::create(&run.out, &origin, sample_rate_hz)?;
     let mut seen = Seen::default();
     let mut view = LiveView::new();
     let mut written = None;

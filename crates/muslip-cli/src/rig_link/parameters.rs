@@ -6,7 +6,7 @@ use muslip_record::{CompensationParameters, Parameters};
 use muslip_recordings::input_error::{InputError, InputProblem, one_line, system_reason};
 
 /// Names of the parameters in the order in which the controller counts them.
-const NAMES: [&str; 38] = [
+const NAMES: [&str; 41] = [
     "wheel.effective_radius_m",
     "wheel.inertia_kg_m2",
     "wheel.vehicle_mass_kg",
@@ -37,6 +37,9 @@ const NAMES: [&str; 38] = [
     "slip_control.maximum_torque_rate_nm_s",
     "brake_heat.maximum_energy_j",
     "brake_heat.cooling_time_s",
+    "pressure.volt_at_zero",
+    "pressure.volt_at_full",
+    "pressure.response_s",
     "compensation.effective_radius",
     "compensation.force_delay_s",
     "compensation.force_lag_s",
@@ -100,6 +103,7 @@ struct TopLevelFirst {
     estimator: muslip_record::EstimatorParameters,
     slip_control: muslip_record::SlipControlParameters,
     brake_heat: muslip_record::HeatParameters,
+    pressure: muslip_record::PressureParameters,
     #[serde(skip_serializing_if = "is_empty")]
     compensation: CompensationParameters,
 }
@@ -122,6 +126,7 @@ impl From<&Parameters> for TopLevelFirst {
             estimator: p.estimator,
             slip_control: p.slip_control,
             brake_heat: p.brake_heat,
+            pressure: p.pressure,
             compensation: p.compensation,
         }
     }

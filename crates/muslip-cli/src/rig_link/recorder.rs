@@ -4,7 +4,7 @@ use std::fs::File;
 use std::io;
 use std::path::Path;
 
-use muslip_record::{SAMPLE_RATE_HZ, Sample};
+use muslip_record::Sample;
 use muslip_recordings::output::OutputError;
 use muslip_recordings::recording::{Channel, RecordingWriter};
 
@@ -13,6 +13,7 @@ use muslip_recordings::recording::{Channel, RecordingWriter};
 pub struct Recorder {
     writer: RecordingWriter<File>,
     path: std::path::PathBuf,
+    sample_rate_hz: u32,
     first_tick: Option<u32>,
     last_tick: Option<u32>,
     rows: u64,
@@ -20,11 +21,15 @@ pub struct Recorder {
 }
 
 impl Recorder {
-    /// Starts a recording, in place of one that may be there.
+    /// Starts a recording of so many samples a second, in place of one that may be there.
     ///
     /// # Errors
     /// [`OutputError`] if the file cannot be made.
-    pub fn create(path: &Path, origin: &[String]) -> Result<Self, OutputError> {
+    pub fn create(
+        path: &Path,
+        origin: &[String],
+        sample_rate_hz: u32,
+    ) -> Result<Self, OutputError> {
         let fail = |error| OutputError::new(path, error);
         let file = File::create(path).map_err(fail)?;
         let mut columns: Vec<&str> = Channel::ALL.iter().take(5).map(|c| c.name()).collect();
@@ -32,6 +37,7 @@ impl Recorder {
         Ok(Self {
             writer: RecordingWriter::new(file, origin, &columns).map_err(fail)?,
             path: path.to_owned(),
+            sample_rate_hz,
             first_tick: None,
             last_tick: None,
             rows: 0,
@@ -55,7 +61,7 @@ impl Recorder {
         let first = *self.first_tick.get_or_insert(sample.tick);
         self.last_tick = Some(sample.tick);
         let row = [
-            f64::from(since(first)) / f64::from(SAMPLE_RATE_HZ),
+            f64::from(since(first)) / f64::from(self.sample_rate_hz),
             f64::from(sample.wheel_speed_rad_s),
             f64::from(sample.vehicle_speed_m_s),
             f64::from(sample.drag_force_n),

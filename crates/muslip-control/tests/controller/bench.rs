@@ -5,11 +5,12 @@ use muslip_control::board::{
 };
 use muslip_control::brake::BrakeOutput;
 use muslip_control::controller::{Controller, Identity};
-use muslip_control::link::Transmit;
+use muslip_control::rates::Rates;
 use muslip_record::{
     Answer, Command, Envelope, FRAME_BYTES, FrameReader, Origin, Parameters, Profile, Program,
     State, Status, Telemetry, encode,
 };
+use test_support::MemoryPort;
 
 /// An encoder that turns.
 #[derive(Default)]
@@ -19,14 +20,20 @@ pub struct Encoder {
 }
 
 impl Encoder {
-    pub fn turn(&mut self, now_s: f64, rad_s: f64, pulses_per_revolution: f64) -> EncoderReading {
+    pub fn turn(
+        &mut self,
+        now_s: f64,
+        rad_s: f64,
+        pulses_per_revolution: f64,
+        rates: Rates,
+    ) -> EncoderReading {
         let rate = rad_s / std::f64::consts::TAU * pulses_per_revolution;
-        let end = self.pulses + rate * 1e-3;
+        let end = self.pulses + rate / f64::from(rates.sample_hz());
         if end.floor() > self.pulses.floor() {
             self.edge_s = now_s - (end - end.floor()) / rate;
         }
         self.pulses = end;
-        let ticks = |s: f64| (s * 84e6) as u64 as u32;
+        let ticks = |s: f64| (s * f64::from(rates.edge_timer_hz())) as u64 as u32;
         EncoderReading {
             edges: (self.pulses as u64 * 2 + 1) as u16,
             edge_ticks: ticks(self.edge_s),
@@ -43,6 +50,8 @@ pub struct Rig {
     pub drag_n: f64,
     pub normal_n: f64,
     pub supply_mv: u16,
+    /// The pressure transmitter's mV, whatever the valves are told.
+    pub pressure_mv: Option<u16>,
     pub emergency_stop: [bool; 2],
     /// The dump valve's output stays as it is, whatever it is told.
     pub holds: Option<bool>,
@@ -64,6 +73,7 @@ impl Rig {
             drag_n: 0.0,
             normal_n: 4120.0,
             supply_mv: 24_000,
+            pressure_mv: None,
             emergency_stop: [false; 2],
             holds: None,
             stuck_drag: false,
@@ -73,22 +83,6 @@ impl Rig {
             late: false,
             wheel_rocks: false,
         }
-    }
-}
-
-#[derive(Default)]
-pub struct Wire {
-    pub bytes: Vec<u8>,
-    pub room: usize,
-}
-
-impl Transmit for Wire {
-    fn room(&self) -> usize {
-        self.room
-    }
-    fn send(&mut self, bytes: &[u8]) {
-        assert!(bytes.len() <= self.room);
-        self.bytes.extend_from_slice(bytes);
     }
 }
 
@@ -110,14 +104,23 @@ impl Actuators for Flash {
     }
 }
 
+/// What the pressure transmitter of the default parameters reads, of a line that follows at once.
+pub fn pressure_mv(output: BrakeOutput) -> u16 {
+    let share = (f64::from(output.valve_duty) / 65535.0 - 0.1) / 0.8;
+    (333.0 + 2667.0 * share.clamp(0.0, 1.0)) as u16
+}
+
 /// A controller with a host that speaks every 100 ms.
 pub struct Bench {
+    pub rates: Rates,
     pub controller: Controller,
     pub rig: Rig,
     pub wheel: Encoder,
     pub vehicle: Encoder,
     pub flash: Flash,
+    /// Bytes that the wire takes in a sample.
     pub room: usize,
+    pub reader: FrameReader,
     pub samples: u64,
     pub number: u16,
     pub keep_alive: bool,
@@ -128,6 +131,7 @@ pub struct Bench {
 }
 
 pub const IDENTITY: Identity = Identity {
+    rates: Rates::new(1_000, 84_000_000),
     core_clock_hz: 168_000_000,
     emulated: false,
     watchdog_reset: false,
@@ -146,12 +150,14 @@ impl Bench {
 
     pub fn with(identity: Identity) -> Self {
         Self {
+            rates: identity.rates,
             controller: Controller::new(&Parameters::default(), identity).unwrap(),
             rig: Rig::rolling(20.0),
             wheel: Encoder::default(),
             vehicle: Encoder::default(),
             flash: Flash::default(),
             room: 4096,
+            reader: FrameReader::new(),
             samples: 0,
             number: 0,
             keep_alive: true,
@@ -163,14 +169,17 @@ impl Bench {
     }
 
     pub fn raw(&mut self) -> RawSample {
-        let now_s = self.samples as f64 * 1e-3;
+        let rates = self.rates;
+        let now_s = self.samples as f64 / f64::from(rates.sample_hz());
         let code = |force: f64, noise: u64| (force / 0.002) as i32 + (noise % 7) as i32;
         if self.rig.wheel_rocks {
             self.wheel.edge_s = now_s - 1e-4;
         }
         let raw = RawSample {
-            wheel: self.wheel.turn(now_s, self.rig.wheel_rad_s, 500.0),
-            vehicle: self.vehicle.turn(now_s, self.rig.vehicle_m_s, 1000.0),
+            wheel: self.wheel.turn(now_s, self.rig.wheel_rad_s, 500.0, rates),
+            vehicle: self
+                .vehicle
+                .turn(now_s, self.rig.vehicle_m_s, 1000.0, rates),
             bridge: BridgeReading {
                 codes: [
                     code(
@@ -182,6 +191,10 @@ impl Bench {
                 quality: self.rig.quality,
             },
             supply_mv: self.rig.supply_mv,
+            pressure_mv: self
+                .rig
+                .pressure_mv
+                .unwrap_or_else(|| pressure_mv(self.output)),
             // Somebody tests it when the rig is switched on.
             emergency_stop: if self.stop_is_tested && (2..5).contains(&self.samples) {
                 [true; 2]
@@ -208,16 +221,11 @@ impl Bench {
         self.samples += 1;
         let raw = self.raw();
         self.output = self.controller.control(&raw);
-        let mut incoming = bytes.iter().copied();
-        let mut wire = Wire {
-            bytes: Vec::new(),
-            room: self.room,
-        };
-        self.controller
-            .communicate(|| incoming.next(), &mut wire, &mut self.flash);
-        let mut reader = FrameReader::new();
-        for &byte in &wire.bytes {
-            if let Some(message) = reader.push::<Envelope<Telemetry>>(byte) {
+        let mut port = MemoryPort::new(self.room);
+        port.incoming.extend(bytes);
+        self.controller.communicate(&mut port, &mut self.flash);
+        for byte in port.outgoing {
+            if let Some(message) = self.reader.push::<Envelope<Telemetry>>(byte) {
                 self.heard.push(message.unwrap().body);
             }
         }
@@ -226,7 +234,11 @@ impl Bench {
 
     pub fn run(&mut self, samples: u32) {
         for _ in 0..samples {
-            if self.keep_alive && self.samples.is_multiple_of(100) {
+            if self.keep_alive
+                && self
+                    .samples
+                    .is_multiple_of(u64::from(self.rates.samples(100)))
+            {
                 self.say(Command::KeepAlive);
             } else {
                 self.sample(&[]);

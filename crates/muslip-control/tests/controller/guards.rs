@@ -2,10 +2,10 @@
 
 use muslip_control::brake::BrakeOutput;
 use muslip_control::controller::Identity;
-use muslip_control::interlock::{DISAGREEING_SAMPLES, STUCK_SAMPLES};
+use muslip_control::interlock::{DISAGREEING_MS, STUCK_SAMPLES};
 use muslip_record::{Answer, Command, Fault, Parameters, Profile, Program, Refusal, State};
 
-use crate::bench::{Bench, IDENTITY, RAMP, Rig};
+use crate::bench::{Bench, IDENTITY, RAMP, Rig, pressure_mv};
 
 /// Samples until the brake is dumped, and the fault.
 fn dumped(bench: &mut Bench, most: u32) -> (u32, Option<Fault>) {
@@ -135,7 +135,7 @@ fn speeds_that_differ_while_the_wheel_rolls_freely_are_a_fault_after_2_s() {
         }
         assert_eq!(bench.controller.fault(), Some(Fault::SpeedsDisagree));
         // Most of it since before the start.
-        assert!(samples <= u32::from(DISAGREEING_SAMPLES), "{samples}");
+        assert!(samples <= DISAGREEING_MS, "{samples}");
         assert!(samples > 1_800, "{samples}");
     }
     let mut bench = Bench::new();
@@ -179,6 +179,51 @@ fn a_brake_that_has_taken_up_all_it_bears_is_dumped_and_cools() {
     // A reset of the parameters does not cool it.
     bench.say(Command::SetParameters { parameters });
     assert!(bench.status().brake_energy_j > 34_000);
+}
+
+#[test]
+fn a_line_that_keeps_its_pressure_after_a_release_is_a_fault_of_the_valves() {
+    let mut bench = Bench::braking();
+    bench.rig.pressure_mv = Some(pressure_mv(bench.output));
+    bench.run(600);
+    // Stuck at what it had: the ramp has left it behind.
+    assert_eq!(bench.controller.fault(), Some(Fault::PressureWrong));
+    assert_eq!(bench.output, BrakeOutput::DUMPED);
+    // It stands as long as there is pressure, and forbids what needs a line without.
+    let mv = pressure_mv(BrakeOutput {
+        valve_duty: u16::MAX / 2,
+        hold_pressure: true,
+    });
+    bench.rig.pressure_mv = Some(mv);
+    bench.run(500);
+    bench.confirm();
+    let stands = Answer::Refused(Refusal::Interlock(Fault::PressureWrong));
+    assert_eq!(bench.say(Command::ClearFault), stands);
+    bench.rig.pressure_mv = None;
+    bench.run(5);
+    assert_eq!(bench.say(Command::ClearFault), Answer::Done);
+}
+
+#[test]
+fn a_valve_that_does_not_open_on_a_release_is_found_within_the_lines_response() {
+    let mut bench = Bench::braking();
+    while bench.output.valve_duty < u16::MAX / 3 {
+        bench.run(1);
+    }
+    bench.rig.pressure_mv = Some(pressure_mv(bench.output));
+    bench.say(Command::Stop);
+    bench.run(1);
+    assert_eq!(bench.output, BrakeOutput::DUMPED);
+    // The tolerance's share of the response, and ten samples.
+    let found = (1..100).find(|_| {
+        bench.run(1);
+        bench.controller.fault().is_some()
+    });
+    assert_eq!(bench.controller.fault(), Some(Fault::PressureWrong));
+    assert!(
+        found.is_some_and(|samples| (30..=50).contains(&samples)),
+        "{found:?}"
+    );
 }
 
 #[test]

@@ -3,9 +3,7 @@
 use muslip_control::board::BridgeQuality;
 use muslip_control::brake::BrakeOutput;
 use muslip_control::controller::Identity;
-use muslip_record::{
-    Answer, Command, Event, Fault, Parameters, Profile, Refusal, State, Telemetry,
-};
+use muslip_record::{Answer, Command, Event, Fault, Profile, Program, Refusal, State, Telemetry};
 
 use crate::bench::{Bench, IDENTITY, RAMP, Rig};
 
@@ -64,6 +62,15 @@ fn every_interlock_dumps_the_brake_on_the_sample_on_which_its_condition_holds() 
     assert_eq!(
         dumped_after(|b| b.rig.supply_mv = 19_999),
         now(Fault::BrownOut)
+    );
+    assert_eq!(
+        dumped_after(|b| b.rig.pressure_mv = Some(150)),
+        now(Fault::PressureLost)
+    );
+    // More pressure than the valves were ever told, by its tenth sample.
+    assert_eq!(
+        dumped_after(|b| b.rig.pressure_mv = Some(2_000)),
+        (10, Fault::PressureWrong)
     );
     assert_eq!(
         dumped_after(|b| b.rig.late = true),
@@ -185,19 +192,25 @@ fn a_locked_wheel_that_rocks_on_an_edge_is_released_as_well() {
 }
 
 #[test]
-fn an_estimator_that_refuses_its_own_state_is_a_fault() {
+fn an_estimator_that_cannot_be_believed_is_a_fault() {
     let mut bench = Bench::new();
-    let mut parameters = Parameters::default();
-    parameters.estimator.friction_std = 1e-30;
-    assert_eq!(
-        bench.say(Command::SetParameters { parameters }),
-        Answer::Done
-    );
-    bench.start(RAMP);
+    bench.start(Profile {
+        program: Program::SlipHold {
+            target_slip: 0.05,
+            hold_s: 5.0,
+        },
+        ..RAMP
+    });
     bench.run(400);
-    bench.rig.wheel_rad_s *= 0.98;
-    bench.rig.drag_n = 1000.0;
-    bench.run(2);
+    assert!(bench.output.hold_pressure);
+    // A drag that is wrong in either direction, by less than its own interlocks see.
+    let mut samples = 0;
+    while bench.state() != State::Fault {
+        bench.rig.drag_n = if samples % 2 == 0 { 3_500.0 } else { -3_500.0 };
+        bench.run(1);
+        samples += 1;
+        assert!(samples < 200, "{:?}", bench.state());
+    }
     assert_eq!(bench.controller.fault(), Some(Fault::EstimatorFault));
     assert_eq!(bench.output, BrakeOutput::DUMPED);
     // A new start needs the fault cleared, and begins a new estimate.

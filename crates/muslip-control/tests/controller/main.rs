@@ -10,4 +10,5 @@ mod guards;
 mod interlocks;
 mod link;
 mod parameters;
+mod rates;
 mod runs;

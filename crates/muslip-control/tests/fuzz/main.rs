@@ -20,11 +20,13 @@ use std::thread;
 use muslip_control::board::{Actuators, NotStored};
 use muslip_control::brake::BrakeOutput;
 use muslip_control::controller::{Controller, Identity};
-use muslip_control::link::Transmit;
+use muslip_control::rates::Rates;
 use muslip_record::{
     Answer, Envelope, FRAME_BYTES, FrameReader, LINK_BYTES_PER_SECOND, Parameters, SAMPLE_RATE_HZ,
     Telemetry,
 };
+
+use test_support::MemoryPort;
 
 use model::{Heard, Model};
 use random::Random;
@@ -41,22 +43,8 @@ const WIRE_BYTES: usize = (LINK_BYTES_PER_SECOND / SAMPLE_RATE_HZ) as usize;
 /// How often each thing happened.
 type Seen = BTreeMap<String, u64>;
 
-/// The wire to the host; a tight one takes what is prompt and no more.
-struct Wire {
-    bytes: Vec<u8>,
-    tight: bool,
-}
-
-impl Transmit for Wire {
-    fn room(&self) -> usize {
-        if self.tight { FRAME_BYTES } else { 4096 }
-    }
-
-    fn send(&mut self, bytes: &[u8]) {
-        assert!(bytes.len() <= self.room());
-        self.bytes.extend_from_slice(bytes);
-    }
-}
+/// More than any sample says.
+const ROOMY_BYTES: usize = 4096;
 
 struct Flash {
     broken: bool,
@@ -88,6 +76,7 @@ impl Bench {
         let parameters = Parameters::default();
         let origin = wire::origin(random);
         let identity = Identity {
+            rates: Rates::new(SAMPLE_RATE_HZ, 84_000_000),
             core_clock_hz: 168_000_000,
             emulated: false,
             watchdog_reset: false,
@@ -138,24 +127,26 @@ impl Bench {
     }
 
     fn communicate(&mut self, random: &mut Random) -> (Vec<Sent>, Vec<u8>) {
-        let mut taken = Vec::new();
-        let mut left = WIRE_BYTES;
-        let mut wire = Wire {
-            bytes: Vec::new(),
-            tight: random.once_in(5),
-        };
+        // A tight wire takes little of it at once: the rest waits, and what may not wait is dropped.
+        let mut port = MemoryPort::new(if random.once_in(5) {
+            random.one_of(&[0, 20, 60, FRAME_BYTES])
+        } else {
+            ROOMY_BYTES
+        });
         let mut flash = Flash {
             broken: random.once_in(4),
         };
-        let host = &mut self.host;
-        let receive = || {
-            left = left.checked_sub(1)?;
-            let (byte, closed) = host.take()?;
+        let mut taken = Vec::new();
+        for (byte, closed) in (0..WIRE_BYTES).map_while(|_| self.host.take()) {
+            port.incoming.push_back(byte);
             taken.extend(closed);
-            Some(byte)
-        };
-        self.controller.communicate(receive, &mut wire, &mut flash);
-        (taken, wire.bytes)
+        }
+        self.controller.communicate(&mut port, &mut flash);
+        assert!(port.incoming.is_empty());
+        // What waits goes out before the next sample.
+        port.capacity = ROOMY_BYTES;
+        self.controller.communicate(&mut port, &mut flash);
+        (taken, port.outgoing.into())
     }
 
     /// Every frame is whole, every number of it finite, and those that are missing are counted.

@@ -4,9 +4,9 @@ use std::collections::VecDeque;
 
 use muslip_control::board::{BridgeQuality, RawSample};
 use muslip_control::brake::BrakeOutput;
-use muslip_control::ceiling::CEILINGS;
+use muslip_control::ceiling::{CEILINGS, RANGES};
 use muslip_control::controller::Controller;
-use muslip_control::interlock::SILENT_SAMPLES;
+use muslip_control::interlock::SILENT_MS;
 use muslip_control::validate;
 use muslip_record::{
     Answer, Command, Envelope, LinkCounters, Origin, Parameters, Profile, Program, Refusal, State,
@@ -128,7 +128,13 @@ impl Model {
                 "end of scale",
             ),
             (normal_n < least_n * 0.9999 - 0.1, "normal force"),
-            (self.silent > SILENT_SAMPLES, "silence"),
+            (
+                f64::from(raw.pressure_mv)
+                    < 500.0 * f64::from(self.parameters.pressure.volt_at_zero) - 1.0
+                    || raw.pressure_mv > 3_201,
+                "pressure transmitter",
+            ),
+            (self.silent > SILENT_MS, "silence"),
         ];
         conditions
             .iter()
@@ -365,9 +371,30 @@ fn assert_within_ceilings(p: &Parameters) {
         ("limits.minimum_supply_v", p.limits.minimum_supply_v),
         ("brake_heat.maximum_energy_j", p.brake_heat.maximum_energy_j),
         ("brake_heat.cooling_time_s", p.brake_heat.cooling_time_s),
+        ("pressure.volt_at_zero", p.pressure.volt_at_zero),
+        ("pressure.volt_at_full", p.pressure.volt_at_full),
+        ("pressure.response_s", p.pressure.response_s),
+        ("wheel.vehicle_mass_kg", p.wheel.vehicle_mass_kg),
+        ("estimator.friction_std", p.estimator.friction_std),
+        ("estimator.noise_inflation", p.estimator.noise_inflation),
+        (
+            "slip_control.bandwidth_rad_s",
+            p.slip_control.bandwidth_rad_s,
+        ),
+        (
+            "slip_control.integral_time_s",
+            p.slip_control.integral_time_s,
+        ),
+        (
+            "slip_control.maximum_torque_rate_nm_s",
+            p.slip_control.maximum_torque_rate_nm_s,
+        ),
     ];
     for (name, value) in taken {
-        let ceiling = CEILINGS.iter().find(|ceiling| ceiling.parameter == name);
+        let ceiling = CEILINGS
+            .iter()
+            .chain(&RANGES)
+            .find(|ceiling| ceiling.parameter == name);
         let within = ceiling.is_some_and(|ceiling| ceiling.allows(value));
         assert!(within, "{name} = {value} was taken");
     }

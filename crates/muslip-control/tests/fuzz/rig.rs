@@ -34,6 +34,7 @@ enum Trouble {
     Stop([bool; 2]),
     Quality(BridgeQuality),
     Supply(u16),
+    Pressure(u16),
     Late,
     Code(usize, i32),
     Wheel(EncoderReading),
@@ -90,7 +91,7 @@ impl Rig {
         };
         let target = if demand > 0.4 { 0.95 } else { demand * 0.3 };
         self.slip += (target - self.slip).clamp(-0.02, 0.02);
-        let raw = self.well(random, output, parameters);
+        let raw = self.well(random, output, demand, parameters);
         self.worse(random, raw)
     }
 
@@ -98,6 +99,7 @@ impl Rig {
         &mut self,
         random: &mut Random,
         output: BrakeOutput,
+        demand: f64,
         parameters: &Parameters,
     ) -> RawSample {
         let now_s = self.samples as f64 * 1e-3;
@@ -137,6 +139,7 @@ impl Rig {
                 quality: BridgeQuality::Fresh,
             },
             supply_mv: 24_000,
+            pressure_mv: pressure_mv(demand, parameters),
             emergency_stop: [(2..5).contains(&self.samples); 2],
             holds: output.hold_pressure,
             confirm: self.pressed,
@@ -158,6 +161,7 @@ impl Rig {
             Some(Trouble::Stop(open)) => raw.emergency_stop = open,
             Some(Trouble::Quality(quality)) => raw.bridge.quality = quality,
             Some(Trouble::Supply(mv)) => raw.supply_mv = mv,
+            Some(Trouble::Pressure(mv)) => raw.pressure_mv = mv,
             Some(Trouble::Late) => raw.late = true,
             Some(Trouble::Code(channel, code)) => raw.bridge.codes[channel] = code,
             Some(Trouble::Wheel(reading)) => raw.wheel = reading,
@@ -169,13 +173,21 @@ impl Rig {
     }
 }
 
+/// The pressure transmitter's mV in a line that follows at once.
+fn pressure_mv(demand: f64, parameters: &Parameters) -> u16 {
+    let pressure = &parameters.pressure;
+    let zero = f64::from(pressure.volt_at_zero);
+    let span = f64::from(pressure.volt_at_full) - zero;
+    (1000.0 * (zero + span * demand)) as u16
+}
+
 fn trouble(random: &mut Random) -> Trouble {
     let reading = EncoderReading {
         edges: random.bits() as u16,
         edge_ticks: random.bits() as u32,
         age_ticks: random.bits() as u32,
     };
-    match random.below(10) {
+    match random.below(11) {
         0 => Trouble::Stop(random.one_of(&[[true; 2], [true, false], [false, true]])),
         1 => Trouble::Quality(random.one_of(&[BridgeQuality::Bad, BridgeQuality::Stale])),
         2 => Trouble::Supply(random.below(24_000) as u16),
@@ -187,6 +199,7 @@ fn trouble(random: &mut Random) -> Trouble {
         6 => Trouble::Wheel(reading),
         7 => Trouble::Vehicle(reading),
         8 => Trouble::Holds(random.once_in(2)),
+        9 => Trouble::Pressure(random.below(4_000) as u16),
         _ => Trouble::Standing,
     }
 }

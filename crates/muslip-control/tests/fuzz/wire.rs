@@ -213,7 +213,7 @@ fn changed(random: &mut Random, parameters: &Parameters) -> Parameters {
         1 => {}
         2 => {
             let any = random.single();
-            let places: [&mut f32; 12] = [
+            let places: [&mut f32; 14] = [
                 &mut parameters.wheel.effective_radius_m,
                 &mut parameters.vehicle_encoder_radius_m,
                 &mut parameters.drag.newton_per_code,
@@ -226,8 +226,10 @@ fn changed(random: &mut Random, parameters: &Parameters) -> Parameters {
                 &mut parameters.slip_control.integral_time_s,
                 &mut parameters.brake_heat.maximum_energy_j,
                 &mut parameters.brake_heat.cooling_time_s,
+                &mut parameters.pressure.volt_at_zero,
+                &mut parameters.pressure.response_s,
             ];
-            let at = random.below(12) as usize;
+            let at = random.below(14) as usize;
             if let Some(place) = places.into_iter().nth(at) {
                 *place = any;
             }

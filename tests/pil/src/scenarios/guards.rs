@@ -4,8 +4,8 @@ use std::path::Path;
 
 use anyhow::{Context, Result, ensure};
 use muslip_control::brake::BrakeOutput;
-use muslip_control::interlock::DISAGREEING_SAMPLES;
-use muslip_control::stop::DIFFERING_SAMPLES;
+use muslip_control::interlock::DISAGREEING_MS;
+use muslip_control::stop::DIFFERING_MS;
 use muslip_record::{Answer, Command, Fault, Profile, Program, Refusal, State, Status};
 
 use super::{Found, LAW, RAMP};
@@ -31,7 +31,7 @@ fn stop_channels(bench: &mut Bench) -> Result<u64> {
     while told.is_none() {
         let status = status(bench)?;
         let samples = u64::from(status.tick) - before;
-        let expected = samples > u64::from(DIFFERING_SAMPLES);
+        let expected = samples > u64::from(DIFFERING_MS);
         ensure!(
             (status.standing & stands != 0) == expected,
             "after {samples} samples: {status:?}"
@@ -63,7 +63,7 @@ fn speeds_disagree(bench: &mut Bench) -> Result<u64> {
         ensure!(bench.samples < before + 2_100, "{:?}", bench.state());
     }
     let waited = bench.samples - before;
-    ensure!(waited == u64::from(DISAGREEING_SAMPLES) + 1, "{waited}");
+    ensure!(waited == u64::from(DISAGREEING_MS) + 1, "{waited}");
     let latched = status(bench)?.fault;
     ensure!(latched == Some(Fault::SpeedsDisagree), "{latched:?}");
     bench.rig.trouble.wheel_rad_s = None;

@@ -5,7 +5,7 @@ use std::path::Path;
 use anyhow::{Result, ensure};
 use muslip_control::board::BridgeQuality;
 use muslip_control::brake::BrakeOutput;
-use muslip_control::interlock::{LOCK_TIME_S, SILENT_SAMPLES};
+use muslip_control::interlock::{LOCK_TIME_S, SILENT_MS};
 use muslip_record::{Command, Fault, Parameters, Profile, Program, State};
 
 use super::{CYCLES_PER_SAMPLE, Found, LAW, RAMP};
@@ -62,6 +62,7 @@ fn injections() -> Vec<Injection> {
         },
         // A contact that chatters: the third jump.
         Injection {
+            holds: |b| b.raw.bridge.codes[0] > CHATTER_CODE,
             samples: 3,
             ..at_once(Fault::BridgeOutOfRange, |b| {
                 trouble(b, |t| t.drag_chatters = true)
@@ -102,7 +103,7 @@ fn injections() -> Vec<Injection> {
             trouble(b, |t| t.extra_vehicle_pulses = 2)
         }),
         Injection {
-            holds: |b| b.host.silent_samples() > u64::from(SILENT_SAMPLES),
+            holds: |b| b.host.silent_samples() > u64::from(SILENT_MS),
             ..at_once(Fault::LinkSilent, |b| b.host.alive = false)
         },
         // Burnt in this sample, which only its end can tell: dumped on the next.
@@ -114,7 +115,7 @@ fn injections() -> Vec<Injection> {
         },
         // The wire says the same over and over: nobody's word.
         Injection {
-            holds: |b| b.host.silent_samples() > u64::from(SILENT_SAMPLES),
+            holds: |b| b.host.silent_samples() > u64::from(SILENT_MS),
             ..at_once(Fault::LinkSilent, |b| b.host.repeats = true)
         },
         Injection {
@@ -139,33 +140,54 @@ fn injections() -> Vec<Injection> {
                 trouble(b, |t| t.stuck_brake_nm = Some(2_500.0))
             })
         },
-        // A brake that grabs takes the wheel into the skid range, where a filter that believes in no noise at all
-        // refuses its first update; that comes after the sample's interlocks, so that the next one dumps.
+        // A drag that is off in either direction, by less than its own interlocks see: five of six readings are left
+        // out and one is believed, until 50 more were left out than taken. No demand there, the fault on the next.
         Injection {
-            holds: |b| {
-                b.rig.slip_ratio() >= f64::from(Parameters::default().estimator.skid_slip_minimum)
-            },
-            samples: 2,
+            samples: 74,
             ..at_once(Fault::EstimatorFault, |b| {
-                trouble(b, |t| t.stuck_brake_nm = Some(2_500.0))
+                trouble(b, |t| t.drag_swings_n = 3_500.0)
+            })
+        },
+        at_once(Fault::PressureLost, |b| {
+            trouble(b, |t| t.pressure_v = Some(0.1))
+        }),
+        // More than the valves were ever told, for the tenth time.
+        Injection {
+            samples: 10,
+            ..at_once(Fault::PressureWrong, |b| {
+                trouble(b, |t| t.pressure_v = Some(2.0))
             })
         },
     ]
 }
 
+/// Half of what a chattering contact adds to the drag, as a code.
+const CHATTER_CODE: i32 = 2_500_000;
+
 /// Energy in J of a ramp's first quarter of a second.
 const BEARS_J: f64 = 1_000.0;
 
-/// Parameters under which a fault can come: an estimator that fails on its first update, a small brake.
-fn prepare(fault: Fault, bench: &mut Bench) -> Result<()> {
-    let mut parameters = Parameters::default();
-    match fault {
-        Fault::EstimatorFault => parameters.estimator.friction_std = 1e-30,
-        Fault::BrakeHot => parameters.brake_heat.maximum_energy_j = BEARS_J as f32,
-        _ => return Ok(()),
+/// A run in which a fault can come: with a brake that bears little, or with a filter whose word counts.
+fn begin(fault: Fault, bench: &mut Bench) -> Result<()> {
+    if fault == Fault::BrakeHot {
+        let mut parameters = Parameters::default();
+        parameters.brake_heat.maximum_energy_j = BEARS_J as f32;
+        bench.run(50)?;
+        bench.set_parameters(parameters)?;
     }
-    bench.run(50)?;
-    bench.set_parameters(parameters)
+    bench.begin(Profile {
+        program: if fault == Fault::EstimatorFault {
+            Program::SlipHold {
+                target_slip: 0.05,
+                hold_s: 5.0,
+            }
+        } else {
+            Program::Ramp { demand_per_s: 0.2 }
+        },
+        // The skid that ends a ramp would end a lock as well.
+        skid_slip: 1.0,
+        ..RAMP
+    })
 }
 
 /// Every fault dumps the brake on the sample on which its condition holds, and latches.
@@ -175,13 +197,7 @@ pub fn interlocks(image: &Path) -> Result<Found> {
     for injection in injections() {
         let fault = injection.fault;
         let mut bench = Bench::start(image, LAW, 4)?;
-        prepare(fault, &mut bench)?;
-        // The skid that ends a ramp would end a lock as well.
-        bench.begin(Profile {
-            program: Program::Ramp { demand_per_s: 0.2 },
-            skid_slip: 1.0,
-            ..RAMP
-        })?;
+        begin(fault, &mut bench)?;
         bench.until(State::Ramp, 1_000)?;
         bench.run(200)?;
         ensure!(

@@ -1,6 +1,6 @@
 //! Figures that registers are set from.
 
-use crate::bits::low_u16;
+use muslip_control::rates::Rates;
 
 /// Core clock in Hz once the PLL runs.
 pub const CORE_HZ: u32 = 168_000_000;
@@ -18,10 +18,10 @@ pub const VALVE_PWM_HZ: u32 = 2_000;
 pub const VALVE_PWM_PRESCALER: u32 = 4;
 /// Steps of a period of that PWM.
 pub const VALVE_PWM_PERIOD: u32 = CORE_HZ / VALVE_PWM_PRESCALER / VALVE_PWM_HZ;
-/// Supply of the valves in mV that makes the converter's full scale: 3.3 V behind a divider of 10:1.
-pub const SUPPLY_FULL_SCALE_MV: u32 = 36_300;
+/// A thousand samples a second; edges are stamped by timers of APB1, which run at twice its clock.
+pub const RATES: Rates = Rates::new(1_000, 2 * APB1_HZ);
 /// Core cycles from one sample to the next.
-pub const CYCLES_PER_SAMPLE: u32 = CORE_HZ / 1_000;
+pub const CYCLES_PER_SAMPLE: u32 = CORE_HZ / RATES.sample_hz();
 
 /// ADC_CCR's ADCPRE (RM0090, 13.13.16): APB2 divided by 4. By 2 it would be above the converter's limit.
 pub const ADC_DIVIDER_BITS: u32 = 0b01;
@@ -29,27 +29,10 @@ pub const ADC_DIVIDER_BITS: u32 = 0b01;
 /// PLL from an 8 MHz crystal: M, N, P, Q.
 pub const PLL: [u32; 4] = [8, 336, 2, 7];
 
-/// Value of a USART's BRR at 16-fold oversampling (RM0090, 30.3.4): clock / baud, rounded; its lower four bits are
-/// the fraction. The link's 921,600 come out as 913,043, 0.9 % slow; on the internal oscillator 2.1 % fast. Receivers
-/// allow some 3 %.
-pub const fn baud_divisor(clock_hz: u32, baud: u32) -> u16 {
-    low_u16((clock_hz + baud / 2) / baud)
-}
-
-/// The supply of the valves in mV from the converter's 12 bits.
-pub const fn supply_mv(code: u16) -> u16 {
-    low_u16(code as u32 * SUPPLY_FULL_SCALE_MV / 4096)
-}
-
-/// Calls `condition` until it holds, at most `limit` times; whether it did. Every wait on hardware is one of
-/// these: QEMU lacks bits that silicon has, and silicon fails.
-pub fn wait_for(limit: u32, mut condition: impl FnMut() -> bool) -> bool {
-    (0..limit).any(|_| condition())
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::stm32::baud_divisor;
 
     #[test]
     fn the_pll_makes_the_core_clock_and_48_mhz_within_its_limits() {
@@ -62,8 +45,6 @@ mod tests {
         assert_eq!(vco / q, 48_000_000);
         assert_eq!(CORE_HZ / 4, APB1_HZ);
         assert_eq!(CORE_HZ / 2, APB2_HZ);
-        // Timers of a divided bus run at twice its clock.
-        assert_eq!(2 * APB1_HZ, muslip_control::EDGE_TIMER_HZ);
     }
 
     #[test]
@@ -81,23 +62,5 @@ mod tests {
         // Data sheet DS8626, table 67: 0.6 to 36 MHz at 3.3 V.
         let divider = 2 * (ADC_DIVIDER_BITS + 1);
         assert!((600_000..=36_000_000).contains(&(APB2_HZ / divider)));
-    }
-
-    #[test]
-    fn the_supply_is_read_in_millivolts() {
-        assert_eq!(supply_mv(0), 0);
-        assert_eq!(supply_mv(2708), 23_999);
-        assert!(supply_mv(4095) < 36_300);
-    }
-
-    #[test]
-    fn a_wait_ends_with_its_condition_or_its_limit() {
-        let mut calls = 0;
-        assert!(wait_for(10, || {
-            calls += 1;
-            calls == 4
-        }));
-        assert_eq!(calls, 4);
-        assert!(!wait_for(10, || false));
     }
 }

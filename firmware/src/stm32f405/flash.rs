@@ -7,9 +7,9 @@ use embedded_storage::nor_flash::{
 };
 
 use crate::registers::Registers;
-use crate::settings::wait_for;
+use crate::stm32::wait_for;
 
-/// Where the parameters are (memory.x).
+/// Where the parameters are (board.x beside this).
 const START: u32 = 0x080C_0000;
 const SECTOR_BYTES: u32 = 128 * 1024;
 const FIRST_SECTOR: u32 = 10;

@@ -10,13 +10,19 @@ use muslip_control::emulation::{Delays, FromFirmware, ToFirmware};
 use muslip_record::{FRAME_BYTES, FrameReader, Parameters, encode};
 use stm32f4::stm32f405::{Interrupt, NVIC, TIM2, USART3, interrupt};
 
+use super::settings::CYCLES_PER_SAMPLE;
+use super::uart;
 use crate::bits::{low_u8, low_u16};
 use crate::cell::InterruptCell;
-use crate::counter::{cycles, is_emulated, start_emulated};
-use crate::dump::{EMULATED_PINS, dump};
-use crate::settings::CYCLES_PER_SAMPLE;
-use crate::{totals, uart};
+use crate::counter::cycles;
+use crate::dump::dump;
+use crate::run::Took;
+use crate::{link, totals};
 
+/// True once the emulated board is in use.
+static EMULATED: AtomicBool = AtomicBool::new(false);
+/// The emulated pins: duty in the lower half, dump valve above.
+static PINS: AtomicU32 = AtomicU32::new(0);
 /// Link bytes that must have arrived before the sample's work.
 static EXPECTED: AtomicU32 = AtomicU32::new(0);
 /// Instructions to waste in the sample's work.
@@ -61,9 +67,42 @@ pub fn start(rig: &USART3, counter: &TIM2) -> (EmulatedSensors, EmulatedActuator
     (EmulatedSensors, EmulatedActuators)
 }
 
+/// Lets TIM2 count instructions, which it does with `-icount shift=0`.
+#[allow(unsafe_code, reason = "raw register values")]
+fn start_emulated(counter: &TIM2) {
+    // SAFETY: no prescaler (RM0090, 18.4.11).
+    counter.psc().write(|w| unsafe { w.bits(0) });
+    // SAFETY: all 32 bits (18.4.12).
+    counter.arr().write(|w| unsafe { w.bits(u32::MAX) });
+    // SAFETY: CEN, counting up (18.4.1).
+    counter.cr1().write(|w| unsafe { w.bits(1) });
+    EMULATED.store(true, Ordering::Relaxed);
+}
+
+/// Whether this is the emulator.
+#[inline]
+pub fn is_emulated() -> bool {
+    EMULATED.load(Ordering::Relaxed)
+}
+
+/// Instructions; wraps.
+#[inline]
+pub fn instructions() -> u32 {
+    #[allow(unsafe_code, reason = "reads a register")]
+    // SAFETY: reading a counter has no effect.
+    unsafe {
+        (*TIM2::ptr()).cnt().read().bits()
+    }
+}
+
+/// The emulated pins are dumped.
+pub fn dump_pins() {
+    PINS.store(0, Ordering::Relaxed);
+}
+
 /// What the emulated pins say.
 pub fn output() -> BrakeOutput {
-    let pins = EMULATED_PINS.load(Ordering::Relaxed);
+    let pins = PINS.load(Ordering::Relaxed);
     BrakeOutput {
         valve_duty: low_u16(pins),
         hold_pressure: pins & DUMP_VALVE != 0,
@@ -87,7 +126,7 @@ impl Sensors for EmulatedSensors {
 impl Actuators for EmulatedActuators {
     fn actuate(&mut self, output: BrakeOutput) {
         let valve = if output.hold_pressure { DUMP_VALVE } else { 0 };
-        EMULATED_PINS.store(u32::from(output.valve_duty) | valve, Ordering::Relaxed);
+        PINS.store(u32::from(output.valve_duty) | valve, Ordering::Relaxed);
     }
 
     fn feed_watchdog(&mut self) {}
@@ -100,7 +139,7 @@ impl Actuators for EmulatedActuators {
 /// Waits until the link bytes that belong before this sample have arrived.
 pub fn await_link() {
     while is_emulated()
-        && (uart::totals()
+        && (link::totals()
             .0
             .wrapping_sub(EXPECTED.load(Ordering::Relaxed)))
         .cast_signed()
@@ -116,16 +155,6 @@ pub fn burn() {
     for _ in 0..BURN.load(Ordering::Relaxed) / 3 {
         cortex_m::asm::nop();
     }
-}
-
-/// What a sample's work took, in instructions.
-pub struct Took {
-    /// The sampling interrupt.
-    pub interrupt: u32,
-    /// The control step.
-    pub control: u32,
-    /// The step and the link's work.
-    pub step: u32,
 }
 
 /// Answers the simulator after a sample's work; `totals` are samples raised, worked on and late so far.
@@ -155,7 +184,7 @@ pub fn answer(tick: u32, took: &Took, delays: Delays, stack_bytes: u32, totals: 
         step_instructions: took.step,
         delays,
         stack_bytes,
-        link_sent: uart::totals().1,
+        link_sent: link::totals().1,
     });
 }
 

@@ -2,7 +2,8 @@
 
 use stm32f4::stm32f405::{FLASH, RCC};
 
-use crate::settings::{PLL, wait_for};
+use super::settings::PLL;
+use crate::stm32::wait_for;
 
 /// Start-up of the crystal takes 2 ms, the PLL 0.3 ms: this many reads at 16 MHz are some 100 ms.
 const LIMIT: u32 = 200_000;

@@ -1,38 +1,56 @@
-//! The bridge converter on SPI2, polled: two frames of 12 bytes are 18 us.
+//! The bridge converter on an SPI, polled: two frames of 12 bytes are 18 us at 10.5 MHz.
+
+use core::ptr;
 
 use embedded_hal::spi::{ErrorKind, ErrorType, Operation, SpiDevice};
-use muslip_control::ads131m02::{Ads131m02, ChannelConfig};
+use muslip_control::ads131m02::{Ads131m02, ChannelConfig, Oversampling};
 use muslip_control::board::{BridgeQuality, BridgeReading};
-use stm32f4::stm32f405::{GPIOB, SPI2};
+use muslip_control::rates::Rates;
 
-use super::bus;
-use crate::registers::{self, set_up};
-use crate::settings::wait_for;
+use super::bus::Bus;
+use super::wait_for;
+use crate::registers::{Port, Registers};
 
 /// A byte takes 130 core cycles; far more than this many reads is a dead bus.
 const LIMIT: u32 = 2_000;
-/// Line of GPIOB that selects the converter.
-const SELECT_LINE: u32 = 12;
+
+const SR: u32 = 0x08;
+const DR: u32 = 0x0C;
+
+/// An SPI that was set up, with the line that selects the converter on it.
+#[derive(Clone, Copy)]
+pub struct Spi {
+    /// Address of the SPI.
+    pub address: u32,
+    /// An access to its data register moves as many bytes as it is wide (STM32G4), and not always one (STM32F4).
+    pub packs: bool,
+    /// The port that selects.
+    pub port: Port,
+    /// Its line.
+    pub line: u32,
+}
 
 /// The converter.
 pub struct Bridge {
-    converter: Ads131m02<Bus>,
+    converter: Ads131m02<Spi>,
 }
 
 impl Bridge {
-    /// SPI2, then the converter.
-    pub fn start(spi: SPI2) -> Self {
-        set_up(&registers::BRIDGE, &mut bus::Bus);
-        let mut converter = Ads131m02::new(Bus(spi));
+    /// Sets the converter up.
+    pub fn start(spi: Spi, rates: Rates) -> Self {
+        let mut bridge = Self::untouched(spi, rates);
         // Where that fails the readings are bad, and each tries on.
-        converter.configure([ChannelConfig::default(); 2]).ok();
-        Self { converter }
+        bridge
+            .converter
+            .configure([ChannelConfig::default(); 2])
+            .ok();
+        bridge
     }
 
     /// The converter as it is, believed to be set up.
-    pub fn untouched(spi: SPI2) -> Self {
+    pub fn untouched(spi: Spi, rates: Rates) -> Self {
         Self {
-            converter: Ads131m02::new(Bus(spi)),
+            converter: Ads131m02::new(spi, Oversampling::of(rates)),
         }
     }
 
@@ -55,33 +73,45 @@ impl Bridge {
     }
 }
 
-/// SPI2 with the converter's select line.
-struct Bus(SPI2);
-
-impl Bus {
+#[allow(unsafe_code, reason = "a data register by its address")]
+impl Spi {
     fn exchange(&mut self, byte: u8) -> Result<u8, ErrorKind> {
-        let status = |bit: u32| self.0.sr().read().bits() as u32 & 1 << bit != 0;
+        let data = self.address + DR;
         // TXE is bit 1, RXNE bit 0 (28.5.3).
-        if !wait_for(LIMIT, || status(1)) {
+        let ready = |bit: u32| wait_for(LIMIT, || Bus.read(self.address + SR) & 1 << bit != 0);
+        if !ready(1) {
             return Err(ErrorKind::Other);
         }
-        self.0
-            .dr()
-            .write(|w| unsafe { w.bits(u16::from(byte) as _) });
-        if !wait_for(LIMIT, || status(0)) {
+        // SAFETY: the SPI's data register, in the width that moves one byte.
+        unsafe {
+            if self.packs {
+                ptr::write_volatile(data as *mut u8, byte);
+            } else {
+                ptr::write_volatile(data as *mut u16, u16::from(byte));
+            }
+        }
+        if !ready(0) {
             return Err(ErrorKind::Other);
         }
-        Ok(self.0.dr().read().bits() as u8)
+        // SAFETY: as above; on a little-endian bus the byte is the lowest.
+        Ok(unsafe {
+            if self.packs {
+                ptr::read_volatile(data as *const u8)
+            } else {
+                let [byte, _] = ptr::read_volatile(data as *const u16).to_le_bytes();
+                byte
+            }
+        })
     }
 
-    fn select(level: bool) {
+    fn select(&self, level: bool) {
         let bits = if level {
-            1 << (SELECT_LINE + 16)
+            1 << (self.line + 16)
         } else {
-            1 << SELECT_LINE
+            1 << self.line
         };
-        // SAFETY: BSRR is written whole and touches this line only.
-        unsafe { (*GPIOB::ptr()).bsrr().write(|w| w.bits(bits)) };
+        // Written whole, it touches this line only.
+        Bus.write(self.port.set_reset(), bits);
         // The converter wants 20 ns between select and clock.
         cortex_m::asm::delay(8);
     }
@@ -118,13 +148,13 @@ impl Bus {
     }
 }
 
-impl ErrorType for Bus {
+impl ErrorType for Spi {
     type Error = ErrorKind;
 }
 
-impl SpiDevice for Bus {
+impl SpiDevice for Spi {
     fn transaction(&mut self, operations: &mut [Operation<'_, u8>]) -> Result<(), ErrorKind> {
-        Self::select(true);
+        self.select(true);
         let mut result = Ok(());
         for operation in operations.iter_mut() {
             result = self.perform(operation);
@@ -132,7 +162,7 @@ impl SpiDevice for Bus {
                 break;
             }
         }
-        Self::select(false);
+        self.select(false);
         result
     }
 }
