@@ -263,7 +263,14 @@ impl Fleet {
             ]
         });
         blocks.push(Block::Table(Table::new(
-            ["of", "over", "how many", "mean", "scatter between", "of its own"],
+            [
+                "of",
+                "over",
+                "how many",
+                "mean",
+                "scatter between",
+                "of its own",
+            ],
             rows,
         )));
         blocks.extend(self.factors.iter().map(|f| Block::Figure(forest(f))));
@@ -373,9 +380,16 @@ impl Fleet {
                     self.outliers.len().min(MOST_ROWS)
                 )),
                 Block::Table(Table {
-                    head: ["recording", "estimate of", "value", "1-sigma", "median", "sigma from it"]
-                        .map(str::to_owned)
-                        .into(),
+                    head: [
+                        "recording",
+                        "estimate of",
+                        "value",
+                        "1-sigma",
+                        "median",
+                        "sigma from it",
+                    ]
+                    .map(str::to_owned)
+                    .into(),
                     rows: rows.collect(),
                     sortable: true,
                 }),
@@ -387,9 +401,10 @@ impl Fleet {
         if self.errors.is_empty() {
             return None;
         }
-        let rows = self.errors.iter().take(MOST_ROWS).map(|(why, count)| {
-            vec![why.clone(), count.as_u64().unwrap_or_default().to_string()]
-        });
+        let rows =
+            self.errors.iter().take(MOST_ROWS).map(|(why, count)| {
+                vec![why.clone(), count.as_u64().unwrap_or_default().to_string()]
+            });
         Some(Section {
             heading: "Recordings without an estimate".into(),
             blocks: vec![Block::Table(Table::new(["reason", "recordings"], rows))],
