@@ -30,6 +30,7 @@ from muslip.fleet import Counts, run
 
 REPOSITORY = pathlib.Path(__file__).parents[2]
 CORES = 2
+EXECUTOR = "CoarseGrainedExecutorBackend"
 LOOP = """
 import sys, time
 import muslip
@@ -50,6 +51,17 @@ def submitted() -> list[str]:
     return shlex.split(line)
 
 
+PROCESSES = {"executor (JVM)": EXECUTOR, "its Python worker": "pyspark.daemon", "the child that works": "muslip.fleet._child"}
+
+
+def peak_mb(process: int) -> float:
+    """The most memory that a process has had, in MB."""
+    with contextlib.suppress(OSError):
+        found = re.search(r"^VmHWM:\s+(\d+) kB", pathlib.Path(f"/proc/{process}/status").read_text(), re.M)
+        return int(found.group(1)) / 1024 if found else 0.0
+    return 0.0
+
+
 class Submission:
     """A ``spark-submit`` with all its processes."""
 
@@ -59,6 +71,7 @@ class Submission:
             "PATH": os.pathsep.join([os.path.dirname(sys.executable), os.environ["PATH"]]),
         }  # fmt: skip
         self.log = folder / "spark.log"
+        self.peak_mb: dict[str, float] = {}
         with self.log.open("ab") as log:
             self.driver = subprocess.Popen(
                 arguments, cwd=folder, env=environment, stdout=subprocess.PIPE, stderr=log, text=True, start_new_session=True,
@@ -66,6 +79,10 @@ class Submission:
 
     def counts(self) -> Counts:
         """Wait for its end; what it counted."""
+        while self.driver.poll() is None:
+            for name, words in PROCESSES.items():
+                self.peak_mb[name] = max([self.peak_mb.get(name, 0.0), *map(peak_mb, self.processes(words))])
+            time.sleep(0.2)
         printed, _ = self.driver.communicate()
         assert self.driver.returncode == 0, self.log.read_text()[-4000:]
         found = re.search(r"^done (\d+), skipped (\d+), failed (\d+)$", printed, re.M)
@@ -152,7 +169,7 @@ def faults(folder: pathlib.Path, submit: Callable[..., Submission], paths: list[
 
     whole = min(256, len(asked) // 2)
     wait_for(0.2)
-    executors = first.processes("CoarseGrainedExecutorBackend")
+    executors = first.processes(EXECUTOR)
     os.kill(executors[0], signal.SIGKILL)
     wait_for(0.6)
     first.kill()
@@ -203,7 +220,9 @@ def main() -> None:
 
     # The README's line as it stands.
     with timed("spark-submit, all of it") as whole:
-        counts = Submission(submitted(), folder, given.executor).counts()
+        submission = Submission(submitted(), folder, given.executor)
+        counts = submission.counts()
+    say("most memory of one: " + ", ".join(f"{name} {peak:.0f} MB" for name, peak in submission.peak_mb.items()))
     ours = [path for path in relative if path.endswith(".csv")]
     check("the README's line", folder / "results", ours, 0, counts)
     written = sorted(path.stat().st_mtime for path in (folder / "results").glob("part-*"))
@@ -229,7 +248,9 @@ def main() -> None:
         seconds = pandas.read_parquet(folder / "results-large")["seconds"]
         rate = loop(rig, large[: max(2 * CORES, given.large // 5)])
         spark = given.large / max(1e-9, written[-1] - written[0] + seconds.mean()) / CORES
-        say(f"large recordings of {size / 2**20:.1f} MB, a second a core: loop {rate:.2f}, Spark {spark:.2f}, {spark / rate:.2f} of it")
+        say(
+            f"large recordings of {size / 2**20:.1f} MB, a second a core: loop {rate:.2f}, Spark {spark:.2f}, {spark / rate:.2f} of it"
+        )
 
     if given.diagnoses:
         longer = fleets.small(folder / "longer", 3 * given.diagnoses, rate_hz=250.0, duration_s=2.0)
