@@ -29,5 +29,7 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(work::fleet_page, module)?)?;
     module.add_function(wrap_pyfunction!(work::predict, module)?)?;
     module.add_function(wrap_pyfunction!(work::simulate, module)?)?;
+    #[cfg(debug_assertions)]
+    module.add_function(wrap_pyfunction!(job::panics, module)?)?;
     Ok(())
 }

@@ -1,6 +1,6 @@
 """A fleet through Spark's local cluster, with all that goes wrong: how fast beside a plain loop, none lost and none twice.
 
-`cargo xtask fleet` runs this in an environment with pyspark; the executors have pandas and pyarrow alone. In the tests it is small.
+`cargo xtask fleet` runs this in an environment with pyspark; its executors have pandas and pyarrow. In the tests it is small.
 Everything printed is measured; what does not hold ends it with an error.
 """
 
@@ -248,9 +248,8 @@ def main() -> None:
         seconds = pandas.read_parquet(folder / "results-large")["seconds"]
         rate = loop(rig, large[: max(2 * CORES, given.large // 5)])
         spark = given.large / max(1e-9, written[-1] - written[0] + seconds.mean()) / CORES
-        say(
-            f"large recordings of {size / 2**20:.1f} MB, a second a core: loop {rate:.2f}, Spark {spark:.2f}, {spark / rate:.2f} of it"
-        )
+        rates = f"loop {rate:.2f}, Spark {spark:.2f}, ratio {spark / rate:.2f}"
+        say(f"large recordings of {size / 2**20:.1f} MB, a second a core: {rates}")
 
     if given.diagnoses:
         longer = fleets.small(folder / "longer", 3 * given.diagnoses, rate_hz=250.0, duration_s=2.0)

@@ -291,8 +291,8 @@ def test_storages_are_read_and_written(made, tmp_path, monkeypatch, by):
 def rows_of(count: int, seed: int = 1) -> pandas.DataFrame:
     """Estimates of a fleet whose scatter is known: rigs 0.01, tyres 0.05, tracks 0.02, recordings 0.015 and their own 0.01."""
     noise = np.random.default_rng(seed)
-    rigs, tyres, tracks = noise.normal(0, 0.01, 20), noise.normal(0, 0.05, 12), noise.normal(0, 0.02, 8)
-    rig, tyre, track, day = (noise.integers(0, most, count) for most in (20, 12, 8, 60))
+    rigs, tyres, tracks = noise.normal(0, 0.01, 15), noise.normal(0, 0.05, 8), noise.normal(0, 0.02, 6)
+    rig, tyre, track, day = (noise.integers(0, most, count) for most in (15, 8, 6, 60))
     peak = 0.8 + rigs[rig] + tyres[tyre] + tracks[track] + noise.normal(0, 0.015, count) + noise.normal(0, 0.01, count)
     # One rig wears its load cell out.
     peak = np.where(rig == 7, peak + 0.0005 * day, peak)

@@ -80,6 +80,15 @@ pub fn test() -> Result<()> {
         .current_dir(wheels())
         .env(COMMAND, target().join(CHECKED).join("muslip"));
     run("tests of the Python package", tests)?;
+    let mut reference = command(
+        &python,
+        &["-W", "error", "-m", "pdoc", "--docformat", "numpy"],
+    );
+    reference
+        .args(["muslip", "muslip.fleet", "--output-directory"])
+        .arg(target().join("python-reference"))
+        .current_dir(wheels());
+    run("Python: reference", reference)?;
     prove(&wheel, SMALL)
 }
 
