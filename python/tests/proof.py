@@ -186,6 +186,10 @@ def faults(folder: pathlib.Path, submit: Callable[..., Submission], paths: list[
         counts = run({"path": asked}, out, rig="rig.toml", timeout_s=2.0)
     check("by a pool", out, asked, 2, counts)
     assert counts == Counts(done=0, skipped=len(asked) - 1, failed=1)
+    # And by Ray, a few anew.
+    os.environ |= {"RAY_AUTH_MODE": "disabled", "RAY_USAGE_STATS_ENABLED": "0"}
+    few = [str(folder / path) for path in [*paths[:50], "torn.csv"]]
+    check("by Ray", folder / "results-ray", few, 1, run(few, folder / "results-ray", engine="ray", rig=folder / "rig.toml"))
 
 
 def main() -> None:

@@ -61,6 +61,9 @@ def test_what_goes_wrong_is_a_row_with_the_commands_line(made, tmp_path):
     parts = (str(error.value), error.value.file, error.value.line, error.value.column, error.value.channel)
     assert tuple(row[name] for name in ("error", "error_file", "error_line", "error_column", "error_channel")) == parts
     assert row["fingerprint"] and row["peak_friction"] is None
+    with pytest.raises(muslip.MuslipError) as error:
+        muslip.estimate(tmp_path / "none.csv", rig)
+    assert process(tmp_path / "none.csv", rig)["error"] == str(error.value)
     for path, of in ((tmp_path / "none.csv", rig), (tmp_path, rig), (paths[0], tmp_path / "none.toml"), (paths[0], None)):
         row = process(path, of)
         assert len(row["error"].splitlines()) == 1 and row["fingerprint"] is None, row
@@ -283,7 +286,7 @@ def test_storages_are_read_and_written(made, tmp_path, monkeypatch, by):
         out = (tmp_path / "results").as_uri()
     assert (row["peak_friction"], row["fingerprint"]) == (expected["peak_friction"], expected["fingerprint"])
     missing = process(("memory://fleet/" if by == "fsspec" else tmp_path.as_uri() + "/") + "none.csv", rig)
-    assert missing["error"].startswith("error: cannot be read: ")
+    assert missing["error"].endswith("none.csv:1:1: cannot be read: no such file or directory")
     assert run(paths[:10], out, rig=rig) == Counts(done=10, skipped=0, failed=0)
     assert run(paths[:10], out, rig=rig) == Counts(done=0, skipped=10, failed=0)
 

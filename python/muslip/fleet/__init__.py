@@ -2,11 +2,11 @@
 
 Examples
 --------
->>> import tempfile, muslip
+>>> import muslip
 >>> from muslip.fleet import process
 >>> rig = muslip.Rig(radius_m=0.31, inertia_kg_m2=1.25, mass_kg=420.0, peak_friction=0.85, critical_slip=0.14)
 >>> process("nowhere.csv", rig=rig)["error"]
-'error: cannot be read: no such file or directory'
+'nowhere.csv:1:1: cannot be read: no such file or directory'
 """
 
 from __future__ import annotations

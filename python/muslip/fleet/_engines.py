@@ -94,13 +94,19 @@ def ray(parts: list[Part], plan: Plan, told: Told) -> None:
     """Ray: a task a part. Workers need pyarrow and this package."""
     import ray
 
-    ray.init(ignore_reinit_error=True)
-    shared = ray.put(plan)
-    asked = [ray.remote(here).options(max_retries=3).remote(part, shared) for part in parts]
-    while asked:
-        ready, asked = ray.wait(asked)
-        for units in ray.get(ready):
-            told(units)
+    is_own = not ray.is_initialized()
+    if is_own:
+        ray.init()
+    try:
+        shared = ray.put(plan)
+        asked = [ray.remote(here).options(max_retries=3).remote(part, shared) for part in parts]
+        while asked:
+            ready, asked = ray.wait(asked)
+            for units in ray.get(ready):
+                told(units)
+    finally:
+        if is_own:
+            ray.shutdown()
 
 
 ENGINES: dict[str, Callable[..., None]] = {"pool": pool, "spark": spark, "ray": ray}

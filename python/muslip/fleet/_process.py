@@ -81,9 +81,6 @@ def error_of(error: Exception) -> Row:
     if isinstance(error, MuslipError):
         where = {"error_file": error.file, "error_line": error.line, "error_column": error.column, "error_channel": error.channel}
         return {"error": str(error), **where}
-    if isinstance(error, OSError):
-        reason = (error.strerror or str(error)).lower()
-        return {"error": f"error: cannot be read: {reason}", "error_file": str(error.filename or "") or None}
     return {"error": f"error: internal, please report it: {type(error).__name__}: {error}"}
 
 
@@ -97,28 +94,37 @@ def settings_of(rig: muslip.Rig | MuslipError, map: object, options: Options) ->
     return hashlib.blake2b(json.dumps(said, sort_keys=True).encode(), digest_size=8).hexdigest()
 
 
-def _fingerprint(unit: Unit, paths: list[str]) -> str:
-    whole = hashlib.blake2b(digest_size=16)
-    for member, path in zip(unit.members, paths, strict=True):
+def _seen(unit: Unit, stack: contextlib.ExitStack) -> tuple[list[str], str]:
+    """Its recordings as files of this machine, as long as the stack lasts, and a hash of their bytes."""
+    paths, whole = [], hashlib.blake2b(digest_size=16)
+    for member in unit.members:
         if isinstance(unit, Group):
             whole.update(member.path.encode() + b"\0")
-        with open(path, "rb") as stream:
-            while block := stream.read(1 << 20):
-                whole.update(block)
-    return whole.hexdigest()
+        try:
+            paths.append(stack.enter_context(_storage.here(member.path)))
+            with open(paths[-1], "rb") as stream:
+                while block := stream.read(1 << 20):
+                    whole.update(block)
+        except OSError as error:
+            missing = "no such file or directory" if isinstance(error, FileNotFoundError) else str(error)
+            reason = (error.strerror or missing).lower()
+            raise MuslipError(f"{member.path}:1:1: cannot be read: {reason}", member.path, 1, 1) from None
+    return paths, whole.hexdigest()
 
 
 def fingerprint_of(unit: Unit) -> str | None:
     """A hash of the bytes of its recordings; ``None`` where they cannot be read."""
     try:
         with contextlib.ExitStack() as stack:
-            return _fingerprint(unit, [stack.enter_context(_storage.here(member.path)) for member in unit.members])
+            return _seen(unit, stack)[1]
     except Exception:
         return None
 
 
-def _named(path: str, map: Any, name: str) -> muslip.Recording:
+def _named(path: str, rig: muslip.Rig, map: Any, name: str) -> muslip.Recording:
     """A copy of a file from elsewhere, which goes by the name that it has there."""
+    # The map in a rig's file, which is for files.
+    map = map or (rig.to_dict() if rig._engine.whole else None)
     return muslip.Recording._of(_native.Columns.read(path, muslip._map(map), name))
 
 
@@ -158,8 +164,7 @@ def computed(
     row: Row = {}
     try:
         with contextlib.ExitStack() as stack:
-            paths = [stack.enter_context(_storage.here(member.path)) for member in unit.members]
-            fingerprint = _fingerprint(unit, paths)
+            paths, fingerprint = _seen(unit, stack)
             if fingerprint == known:
                 return None
             for given in (rig, map):
@@ -169,7 +174,7 @@ def computed(
             # Seen whole, so that whatever comes now is an answer about these very bytes.
             row["fingerprint"] = fingerprint
             names = [member.path for member in unit.members]
-            sources = [path if path == name else _named(path, map, name) for path, name in zip(paths, names, strict=True)]
+            sources = [path if path == name else _named(path, rig, map, name) for path, name in zip(paths, names, strict=True)]
             row |= _diagnosed(sources, rig, map) if isinstance(unit, Group) else _estimated(sources[0], rig, map, options)
     except Exception as error:
         row |= error_of(error)
