@@ -123,8 +123,9 @@ def fingerprint_of(unit: Unit) -> str | None:
 
 def _named(path: str, rig: muslip.Rig, map: Any, name: str) -> muslip.Recording:
     """A copy of a file from elsewhere, which goes by the name that it has there."""
-    # The map in a rig's file, which is for files.
-    map = map or (rig.to_dict() if rig._engine.whole else None)
+    # The map in a rig's file is for files, which this has ceased to be.
+    tables = rig.to_dict() if map is None and rig._engine.whole else {}
+    map = map or {table: tables[table] for table in ("channels", "time") if table in tables} or None
     return muslip.Recording._of(_native.Columns.read(path, muslip._map(map), name))
 
 
