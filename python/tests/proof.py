@@ -201,7 +201,8 @@ def main() -> None:
     parser.add_argument("--wheel", required=True)
     parser.add_argument("--folder", type=pathlib.Path, required=True)
     given = parser.parse_args()
-    folder: pathlib.Path = given.folder
+    folder: pathlib.Path = given.folder.absolute()
+    executor = os.path.abspath(given.executor)
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
     (folder / "python").symlink_to(REPOSITORY / "python")
@@ -214,7 +215,7 @@ def main() -> None:
         words = submitted()
         at = words.index("run")
         return Submission(
-            [*words[:at], command, pattern, "--rig", "rig.toml", "--out", out, "--engine", "spark", *more], folder, given.executor
+            [*words[:at], command, pattern, "--rig", "rig.toml", "--out", out, "--engine", "spark", *more], folder, executor
         )
 
     with timed(f"{given.recordings} small recordings made"):
@@ -224,7 +225,7 @@ def main() -> None:
 
     # The README's line as it stands.
     with timed("spark-submit, all of it") as whole:
-        submission = Submission(submitted(), folder, given.executor)
+        submission = Submission(submitted(), folder, executor)
         counts = submission.counts()
     say("most memory of one: " + ", ".join(f"{name} {peak:.0f} MB" for name, peak in submission.peak_mb.items()))
     ours = [path for path in relative if path.endswith(".csv")]

@@ -332,7 +332,8 @@ def test_the_summary_finds_what_was_put_in(tmp_path):
         # Of so few levels a scatter is known to a factor of two at the most.
         assert size / 2 < by_name[name].crossed < 2 * size, by_name[name]
         assert by_name[name].between < 3 * size
-        assert abs(by_name[name].mean.value - 0.8) < 4 * by_name[name].mean.std
+        # Of these tyres and tracks: their own effects are part of a rig's mean.
+        assert abs(by_name[name].mean.value - frame["peak_friction"].mean()) < 4 * by_name[name].mean.std
     drifting = [one for one in found.drifts if one.drifts]
     assert [one.rig for one in drifting] == ["rig-7"]
     assert abs(drifting[0].per_day.value - 0.0005) < 4 * drifting[0].per_day.std

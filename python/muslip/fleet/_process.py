@@ -106,8 +106,8 @@ def _seen(unit: Unit, stack: contextlib.ExitStack) -> tuple[list[str], str]:
                 while block := stream.read(1 << 20):
                     whole.update(block)
         except OSError as error:
-            missing = "no such file or directory" if isinstance(error, FileNotFoundError) else str(error)
-            reason = (error.strerror or missing).lower()
+            is_missing = isinstance(error, FileNotFoundError)
+            reason = "no such file or directory" if is_missing else (error.strerror or str(error)).lower()
             raise MuslipError(f"{member.path}:1:1: cannot be read: {reason}", member.path, 1, 1) from None
     return paths, whole.hexdigest()
 

@@ -154,8 +154,10 @@ def _crossed(frame: pandas.DataFrame, factors: Sequence[str], quantity: str) -> 
     """Scatter that each factor has of its own: a mixed model of the means by rig, tyre and track (REML)."""
     from statsmodels.regression.mixed_linear_model import MixedLM, VCSpec
 
+    if len(factors) < 2:
+        return {}
     cells = frame.groupby(list(factors))[quantity].mean().reset_index()
-    if len(factors) < 2 or not len(factors) < len(cells) <= _MOST_CELLS:
+    if not len(factors) < len(cells) <= _MOST_CELLS:
         return {}
     design = [(cells[name].to_numpy()[:, None] == np.unique(cells[name])[None, :]).astype(float) for name in factors]
     names = [[[f"{name}{index}" for index in range(part.shape[1])]] for name, part in zip(factors, design, strict=True)]
@@ -168,7 +170,7 @@ def _crossed(frame: pandas.DataFrame, factors: Sequence[str], quantity: str) -> 
 def _factors(frame: pandas.DataFrame, quantity: str) -> list[Factor]:
     varied = [name for name in FACTORS if frame[name].nunique() > 1]
     known = frame.dropna(subset=varied)
-    crossed = _crossed(known, varied, quantity) if len(known) else {}
+    crossed = _crossed(known, varied, quantity)
     factors = []
     for name in varied:
         levels = _levels(frame.dropna(subset=[name]), name, quantity)
