@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import warnings
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
 from typing import TYPE_CHECKING, Any
@@ -153,6 +154,7 @@ def _levels(frame: pandas.DataFrame, by: str | list[str], quantity: str) -> list
 def _crossed(frame: pandas.DataFrame, factors: Sequence[str], quantity: str) -> dict[str, float]:
     """Scatter that each factor has of its own: a mixed model of the means by rig, tyre and track (REML)."""
     from statsmodels.regression.mixed_linear_model import MixedLM, VCSpec
+    from statsmodels.tools.sm_exceptions import ConvergenceWarning
 
     if len(factors) < 2:
         return {}
@@ -163,7 +165,10 @@ def _crossed(frame: pandas.DataFrame, factors: Sequence[str], quantity: str) -> 
     names = [[[f"{name}{index}" for index in range(part.shape[1])]] for name, part in zip(factors, design, strict=True)]
     spec = VCSpec(list(factors), names, [[part] for part in design])
     ones = np.ones(len(cells))
-    found = MixedLM(cells[quantity].to_numpy(), ones, groups=ones, exog_vc=spec).fit(reml=True)
+    with warnings.catch_warnings():
+        # That a factor scatters by nothing, the boundary of what it can, is an answer.
+        warnings.simplefilter("ignore", ConvergenceWarning)
+        found = MixedLM(cells[quantity].to_numpy(), ones, groups=ones, exog_vc=spec).fit(reml=True)
     return {name: float(np.sqrt(max(variance, 0.0))) for name, variance in zip(factors, found.vcomp, strict=True)}
 
 
