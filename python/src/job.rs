@@ -117,3 +117,11 @@ fn words(panic: &(dyn Any + Send)) -> String {
         .unwrap_or("no reason given")
         .to_owned()
 }
+
+/// Panics where the work of a call would. Not in a release: the tests show by it that no panic crosses.
+#[cfg(debug_assertions)]
+#[pyfunction]
+#[expect(clippy::panic, reason = "what it is for")]
+pub(crate) fn panics(py: Python<'_>, words: String) -> PyResult<()> {
+    run(py, None, move |_| std::panic::panic_any(words))
+}

@@ -21,11 +21,15 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<work::Estimate>()?;
     module.add_class::<work::Diagnosed>()?;
     module.add_class::<filter::Estimator>()?;
+    module.add_function(wrap_pyfunction!(rig::map_json, module)?)?;
     module.add_function(wrap_pyfunction!(work::channels, module)?)?;
     module.add_function(wrap_pyfunction!(work::estimate, module)?)?;
     module.add_function(wrap_pyfunction!(work::fit, module)?)?;
     module.add_function(wrap_pyfunction!(work::diagnose, module)?)?;
+    module.add_function(wrap_pyfunction!(work::fleet_page, module)?)?;
     module.add_function(wrap_pyfunction!(work::predict, module)?)?;
     module.add_function(wrap_pyfunction!(work::simulate, module)?)?;
+    #[cfg(debug_assertions)]
+    module.add_function(wrap_pyfunction!(job::panics, module)?)?;
     Ok(())
 }

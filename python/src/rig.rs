@@ -149,6 +149,19 @@ pub(crate) fn map_of(map: Option<&(bool, String)>) -> Result<Option<Map>, Failur
     }
 }
 
+/// The tables of a map's file as JSON, once they are checked: a map that goes where its file does not.
+#[pyfunction]
+pub(crate) fn map_json(path: PathBuf) -> PyResult<String> {
+    Ok(guarded(|| {
+        let bytes = std::fs::read(&path).map_err(|error| InputError::unreadable(&path, &error))?;
+        map_file::parse(&path, &bytes)?;
+        let fail = |error: &dyn std::error::Error| Failure::Other(error.to_string());
+        let tables: toml::Table =
+            toml::from_str(&String::from_utf8_lossy(&bytes)).map_err(|error| fail(&error))?;
+        serde_json::to_string(&tables).map_err(|error| fail(&error))
+    })?)
+}
+
 /// A repaired model.
 #[pyclass(frozen, module = "muslip._native")]
 pub(crate) struct Model {

@@ -20,6 +20,7 @@ use muslip_recordings::output::write_file;
 use muslip_recordings::recording::{Channel, Recording, RecordingWriter, Required};
 use muslip_report::diagnose::views::Views;
 use muslip_report::diagnose::{files, page};
+use muslip_report::fleet::Fleet;
 use muslip_report::of_estimate;
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
@@ -309,6 +310,16 @@ pub(crate) fn diagnose(
         diagnosed.write(out)?;
     }
     Ok(diagnosed)
+}
+
+/// The page of a fleet, of its summary as JSON.
+#[pyfunction]
+pub(crate) fn fleet_page(summary: &str, results: &str, command: &str) -> PyResult<String> {
+    Ok(job::guarded(|| {
+        let fleet: Fleet =
+            serde_json::from_str(summary).map_err(|error| Failure::Other(error.to_string()))?;
+        Ok(fleet.page(results, command).to_html()?)
+    })?)
 }
 
 /// `muslip predict`: the columns of its file as bytes.

@@ -7,6 +7,7 @@ import json
 import os
 import pathlib
 import pickle
+import resource
 import shutil
 import signal
 import subprocess
@@ -198,6 +199,36 @@ def test_an_interrupt_ends_a_diagnosis_within_a_second(files):
         signal.signal(signal.SIGINT, before)
 
 
+def test_no_panic_crosses():
+    for words in ("put in by a test", "a second time"):
+        with pytest.raises(muslip.MuslipError) as error:
+            muslip._native.panics(words)
+        assert str(error.value) == f"error: internal, please report it: {words}"
+        assert isinstance(error.value, Exception)
+
+
+def test_a_call_adds_less_than_a_twentieth_to_the_engine(files, tmp_path):
+    rig, _ = files
+    run = tmp_path / "long.csv"
+    command("simulate", "--rig", rig, "--seed", 1, "--duration", 60, "--rate-hz", 1000, "--out", run)
+    calls, commands = [], []
+
+    def commanded() -> float:
+        used = resource.getrusage(resource.RUSAGE_CHILDREN)
+        return used.ru_utime + used.ru_stime
+
+    for _ in range(8):
+        # Time of the processor, so that whatever else runs is not counted.
+        before = time.process_time()
+        muslip.estimate(run, rig, trace=False)
+        calls.append(time.process_time() - before)
+        before = commanded()
+        command("estimate", "--rig", rig, "--json", run)
+        commands.append(commanded() - before)
+    print(f"a call {min(calls):.4f} s, the command {min(commands):.4f} s")
+    assert min(calls) < 1.05 * min(commands)
+
+
 def test_the_readmes_lines_run(files, tmp_path, monkeypatch, capsys):
     rig, runs = files
     shutil.copy(rig, tmp_path / "rig.toml")
@@ -209,6 +240,17 @@ def test_the_readmes_lines_run(files, tmp_path, monkeypatch, capsys):
         exec(lines, {})
         peak = muslip.estimate("run.csv", "rig.toml").peak_friction
         assert capsys.readouterr().out == f"{peak.value} +- {peak.std}\n", name
+
+
+def test_the_tutorial_runs(tmp_path):
+    import nbclient
+    import nbformat
+
+    notebook = nbformat.read(pathlib.Path(__file__).parents[1] / "tutorial.ipynb", as_version=4)
+    nbclient.NotebookClient(notebook, timeout=300, resources={"metadata": {"path": str(tmp_path)}}).execute()
+    shown = [output for cell in notebook.cells if cell.cell_type == "code" for output in cell.outputs]
+    assert any("<svg" in output.get("data", {}).get("text/html", "") for output in shown)
+    assert any("image/png" in output.get("data", {}) for output in shown)
 
 
 def test_examples_of_the_docstrings():

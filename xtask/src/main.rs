@@ -94,6 +94,18 @@ enum Command {
     },
     /// Build the Python package as a wheel, install it, and hold it against the command.
     Python,
+    /// A fleet of recordings through Spark's local cluster, against a plain loop, with workers and driver killed: of the Python package.
+    Fleet {
+        /// Small recordings, which are estimated.
+        #[arg(long, default_value_t = 100_000)]
+        recordings: u32,
+        /// Diagnoses of three recordings each.
+        #[arg(long, default_value_t = 1_000)]
+        diagnoses: u32,
+        /// Recordings of a minute at 1 kHz.
+        #[arg(long, default_value_t = 200)]
+        large: u32,
+    },
     /// Write the field guide, docs/mechanisms.md with its pictures, from what the mechanisms say of themselves.
     Mechanisms,
     /// Compile the core to WebAssembly for the pages' what-if, into crates/muslip-report/what-if.
@@ -126,6 +138,15 @@ fn main() -> anyhow::Result<()> {
         Command::Test => test::run_all(),
         Command::Check => check::run_all(),
         Command::Python => python::test_alone(),
+        Command::Fleet {
+            recordings,
+            diagnoses,
+            large,
+        } => python::fleet(python::Proof {
+            recordings,
+            diagnoses,
+            large,
+        }),
         Command::Formats { mutations } => formats::test(mutations),
         Command::Firmware => firmware::budgets(),
         Command::Pil {

@@ -64,6 +64,13 @@ const PYTHON_TOOLS: &[Tool] = &[Tool {
     needed_for: "the files that the readers are held against, and the Python package",
 }];
 
+/// What Spark runs on.
+const SPARK_TOOLS: &[Tool] = &[Tool {
+    program: "java",
+    package: "openjdk-17-jre-headless",
+    needed_for: "a fleet of recordings through Spark",
+}];
+
 /// The interpreter of a virtual environment below the target folder that has these requirements; made once, and again
 /// where they change.
 pub fn python_environment(name: &str, requirements: &Path) -> Result<PathBuf> {
@@ -93,6 +100,11 @@ pub fn python_environment(name: &str, requirements: &Path) -> Result<PathBuf> {
         fs::write(&stamp, &wanted)?;
     }
     Ok(python)
+}
+
+/// As [`run_all`], for a fleet through Spark.
+pub fn for_spark() -> Result<()> {
+    Machine::this().tools(SPARK_TOOLS)
 }
 
 /// As [`run_all`], for `cargo xtask cycles`.

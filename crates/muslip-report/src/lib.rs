@@ -3,7 +3,7 @@
 //!
 //! [`Figure`] says what is to be seen, [`Report`] puts text, tables and figures on a page that needs no
 //! network, [`svg`] draws the same figures for a document, [`text`] breaks words and tables for a terminal. The
-//! pages of this project's own results stand beside that: [`of_estimate`], [`campaign`], [`diagnose`], [`guide`].
+//! pages of this project's own results stand beside that: [`of_estimate`], [`campaign`], [`diagnose`], [`fleet`], [`guide`].
 //!
 //! ```
 //! use muslip_report::{Axis, Block, Figure, Ink, Report, Section, Shape, Tone};
@@ -39,6 +39,7 @@ pub mod diagnose;
 mod estimate;
 mod export;
 mod figure;
+pub mod fleet;
 pub mod guide;
 mod legend;
 mod page;

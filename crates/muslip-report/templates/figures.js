@@ -31,12 +31,19 @@ muslip.Figure = (() => {
       pen = sound;
     }
   };
+  /** More points than these are painted as squares, in which a browser does not lag. */
+  const MANY = 5000;
   const circles = (u, path, xs, ys, radius) => {
     const size = radius * devicePixelRatio;
+    const isMany = xs.length > MANY;
     for (let i = 0; i < xs.length; i++) {
       const x = u.valToPos(xs[i], "x", true);
       const y = u.valToPos(ys[i], "y", true);
       if (xs[i] === null || ys[i] === null || !Number.isFinite(x + y)) continue;
+      if (isMany) {
+        path.rect(x - size / 2, y - size / 2, size, size);
+        continue;
+      }
       path.moveTo(x + size, y);
       path.arc(x, y, size, 0, 2 * Math.PI);
     }

@@ -1,0 +1,161 @@
+"""A process that works on one recording at a time, and can be ended: what hangs, aborts or is killed costs one row and no job."""
+
+from __future__ import annotations
+
+import atexit
+import contextlib
+import os
+import pickle
+import queue
+import struct
+import subprocess
+import sys
+import threading
+from collections.abc import Callable
+from typing import IO, Any
+
+_HEAD = struct.Struct("<Q")
+
+
+class TooLong(Exception):
+    """The work took longer than it may."""
+
+
+class Died(Exception):
+    """The process of the work ended without an answer."""
+
+
+def _send(stream: IO[bytes], value: object) -> None:
+    content = pickle.dumps(value, protocol=pickle.HIGHEST_PROTOCOL)
+    stream.write(_HEAD.pack(len(content)) + content)
+    stream.flush()
+
+
+def _receive(stream: IO[bytes]) -> Any:
+    head = stream.read(_HEAD.size)
+    if len(head) < _HEAD.size:
+        raise EOFError
+    (length,) = _HEAD.unpack(head)
+    content = stream.read(length)
+    if len(content) < length:
+        raise EOFError
+    return pickle.loads(content)
+
+
+class Child:
+    """A process of its own, started anew and not forked: the threads of an engine do not survive a fork.
+
+    Parameters
+    ----------
+    folder : str, optional
+        Where it works, so that relative paths mean the same; where that folder is on this machine.
+    """
+
+    def __init__(self, folder: str | None = None) -> None:
+        self._folder = folder if folder is not None and os.path.isdir(folder) else None
+        self._process: subprocess.Popen[bytes] | None = None
+        self._answers: queue.SimpleQueue[Any] = queue.SimpleQueue()
+
+    def _start(self) -> subprocess.Popen[bytes]:
+        # One thread a child: the cores are shared by children.
+        environment = {**os.environ, "RAYON_NUM_THREADS": "1", "PYTHONPATH": os.pathsep.join(map(os.path.abspath, sys.path))}
+        process = subprocess.Popen(
+            [sys.executable, "-c", "from muslip.fleet._child import serve; serve()"],
+            stdin=subprocess.PIPE, stdout=subprocess.PIPE, cwd=self._folder, env=environment,
+        )  # fmt: skip
+        answers: queue.SimpleQueue[Any] = queue.SimpleQueue()
+
+        def listen(stream: IO[bytes]) -> None:
+            try:
+                while True:
+                    answers.put((True, _receive(stream)))
+            except Exception:
+                answers.put((False, None))
+
+        assert process.stdout is not None
+        threading.Thread(target=listen, args=(process.stdout,), name="muslip-fleet", daemon=True).start()
+        self._process, self._answers = process, answers
+        is_ready, _ = answers.get()
+        if not is_ready:
+            self.close()
+            raise RuntimeError(f"{sys.executable} cannot import muslip.fleet: its words are on standard error")
+        return process
+
+    @property
+    def pid(self) -> int | None:
+        """Of its process, while there is one."""
+        return None if self._process is None else self._process.pid
+
+    def call(self, function: Callable[..., Any], *arguments: object, timeout_s: float | None = None) -> Any:
+        """What a function answers there; its process is started where there is none.
+
+        Raises
+        ------
+        TooLong
+            It took longer than ``timeout_s``; its process is ended.
+        Died
+            Its process ended.
+        """
+        process = self._process or self._start()
+        assert process.stdin is not None
+        try:
+            _send(process.stdin, (function, arguments))
+            is_answer, answer = self._answers.get(timeout=timeout_s)
+        except queue.Empty:
+            self.close()
+            raise TooLong from None
+        except OSError:
+            is_answer, answer = False, None
+        if not is_answer:
+            code = process.wait()
+            self.close()
+            raise Died(f"signal {-code}" if code < 0 else f"status {code}")
+        return answer
+
+    def close(self) -> None:
+        """End it."""
+        process, self._process = self._process, None
+        if process is None:
+            return
+        process.kill()
+        process.wait()
+        for stream in (process.stdin, process.stdout):
+            if stream is not None:
+                with contextlib.suppress(OSError):
+                    stream.close()
+
+
+_mine = threading.local()
+
+
+def mine(folder: str | None) -> Child:
+    """The child of this thread of this process, kept for the next recording."""
+    if getattr(_mine, "of", None) != (os.getpid(), folder):
+        # A forked process has its parent's child, which is not for it to end.
+        _mine.of, _mine.child = (os.getpid(), folder), Child(folder)
+        atexit.register(_mine.child.close)
+    child: Child = _mine.child
+    return child
+
+
+def serve() -> None:
+    """Work until nobody asks any more."""
+    requests, answers = os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb")
+    # Whatever prints is not to print between the answers.
+    os.dup2(2, 1)
+    waiting: queue.SimpleQueue[Any] = queue.SimpleQueue()
+
+    def listen() -> None:
+        try:
+            while True:
+                waiting.put(_receive(requests))
+        except EOFError:
+            # Who asked is gone; so is the sense of whatever is being worked on.
+            os._exit(0)
+
+    threading.Thread(target=listen, daemon=True).start()
+    # So that no recording is charged with the start.
+    _send(answers, None)
+    while True:
+        function, arguments = waiting.get()
+        _send(answers, function(*arguments))
