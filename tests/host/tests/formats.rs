@@ -125,6 +125,32 @@ fn what_cannot_be_told_is_one_line_with_the_candidates() {
     assert!(told.contains("its time repeats at sample 1"), "{told}");
     let told = replaced("0,010;", "0,010;7;");
     assert!(told.starts_with("run.csv:6:"), "{told}");
+    // Two that may be the brake: every command asks, though an estimate needs none; `channels` lists them and the map says how to go on.
+    let two_brakes = german()
+        .replace("Radlast\n", "Radlast;Bremsdruck VL;Bremsdruck VR\n")
+        .replace("kN;kN\n", "kN;kN;bar;bar\n")
+        .replace(";4\n", ";4;10;11\n");
+    scratch.write("brakes.csv", two_brakes);
+    for command in [
+        "estimate --radius 0.31 brakes.csv",
+        "convert --out out.csv brakes.csv",
+    ] {
+        let told = scratch.complaint(&words(command));
+        assert!(
+            told.contains(
+                "column brake_pressure_pa may be Bremsdruck VL [bar], Bremsdruck VR [bar]"
+            ),
+            "{told}"
+        );
+    }
+    let text = scratch.output(&words("channels brakes.csv --write-map map.toml"));
+    assert!(text.contains("brake_pressure_pa may be"), "{text}");
+    assert!(
+        scratch
+            .read("map.toml")
+            .contains("# column brake_pressure_pa may be")
+    );
+    scratch.output(&words("estimate --radius 0.31 --map map.toml brakes.csv"));
     // Two wheels: never the first of them.
     scratch.write(
         "map.toml",

@@ -16,6 +16,7 @@ mod fit;
 mod mapping;
 mod predict;
 mod progress;
+mod records;
 mod rig;
 mod rig_view;
 mod simulate;
