@@ -55,7 +55,9 @@ pub fn run_all() -> Result<()> {
         "--",
         "--include-ignored",
     ]);
-    workspace.env(formats::FILES, files);
+    workspace
+        .env(formats::FILES, files)
+        .env(formats::PYTHON, formats::python()?);
     let workspace = tests("tests of the workspace", workspace)?;
 
     // These exist only with the feature on.
