@@ -45,9 +45,18 @@ pub fn python() -> Result<PathBuf> {
     setup::python_environment("formats", &requirements)
 }
 
-/// A script of tests/formats, with the place of a program that is built first.
-fn script(name: &str, build: &[&str], program: &str) -> Result<Command> {
-    run(&format!("build {program}"), cargo(build))?;
+/// A script of tests/formats, with the place of a program that is built first: of the whole workspace, so that nothing is built a second time with
+/// other features.
+fn script(name: &str, program: &str) -> Result<Command> {
+    let build = cargo(&[
+        "build",
+        "--release",
+        "--locked",
+        "--quiet",
+        "--bin",
+        program,
+    ]);
+    run(&format!("build {program}"), build)?;
     let mut script = command(&python()?.to_string_lossy(), &[]);
     script
         .arg(root().join("tests/formats").join(name))
@@ -58,16 +67,7 @@ fn script(name: &str, build: &[&str], program: &str) -> Result<Command> {
 
 /// Times the readers beside the programs that the field uses, and writes the table into docs/formats.md where that is wanted.
 pub fn times(write: bool) -> Result<()> {
-    // Of the whole workspace, so that nothing is built a second time with other features.
-    let build = [
-        "build",
-        "--release",
-        "--locked",
-        "--quiet",
-        "--example",
-        "time",
-    ];
-    let mut times = script("times.py", &build, "examples/time")?;
+    let mut times = script("times.py", "time-reading")?;
     let output = times.stderr(Stdio::inherit()).output()?;
     let table = String::from_utf8(output.stdout)?;
     print!("{table}");
@@ -89,15 +89,7 @@ fn put(marks: [&str; 2], table: &str) -> Result<()> {
 
 /// Converts files that are larger than memory should be; `rows` of the CSV, a tenth of it in the MDF file.
 pub fn large(rows: u64) -> Result<()> {
-    let build = [
-        "build",
-        "--release",
-        "--locked",
-        "--quiet",
-        "--bin",
-        "muslip",
-    ];
-    let mut large = script("large.py", &build, "muslip")?;
+    let mut large = script("large.py", "muslip")?;
     large.arg(rows.to_string());
     run("long files", large)
 }

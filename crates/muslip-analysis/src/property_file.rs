@@ -341,7 +341,8 @@ impl PropertyFile {
                 } else {
                     format!("   ${what}")
                 };
-                let _ = writeln!(text, "{key:<24} = {value:<22}{what}");
+                let row = format!("{key:<24} = {value:<22}{what}");
+                let _ = writeln!(text, "{}", row.trim_end());
             }
         };
         let number = |value: f64| format!("{value:?}");

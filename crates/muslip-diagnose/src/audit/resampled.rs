@@ -49,31 +49,37 @@ fn of_column(column: &str, runs: &[Run]) -> Vec<Finding> {
         .collect()
 }
 
+/// Three digits behind the point at most.
+fn rounded(value: f64) -> f64 {
+    (1e3 * value).round() / 1e3
+}
+
 fn finding(one: &Resampled) -> Finding {
     let Resampled {
         column, interval_s, ..
     } = one;
-    let ms = 1e3 * interval_s;
+    let ms = rounded(1e3 * interval_s);
     let (word, value, statement) = match one.how {
         How::Interpolated => (
             Word::Held,
             *interval_s,
             format!(
-                "The channel {column} was measured every {ms:.4} ms only; what stands between its readings are straight lines, no measurements."
+                "The channel {column} was measured every {ms} ms only; what stands between its readings are straight lines, no measurements."
             ),
         ),
         How::Held => (
             Word::Held,
             *interval_s,
             format!(
-                "The channel {column} was measured every {ms:.4} ms only; its last reading is held in between."
+                "The channel {column} was measured every {ms} ms only; its last reading is held in between."
             ),
         ),
         How::Decimated { edge_hz } => (
             Word::LowPassed,
             1.0 / (TAU * edge_hz),
             format!(
-                "The channel {column} was measured every {ms:.4} ms and low-passed at {edge_hz:.4} Hz, without delay, before it was thinned to the recording's times."
+                "The channel {column} was measured every {ms} ms and low-passed at {} Hz, without delay, before it was thinned to the recording's times.",
+                rounded(edge_hz)
             ),
         ),
     };

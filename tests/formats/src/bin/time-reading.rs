@@ -1,4 +1,4 @@
-//! Reads every numeric channel of a file, and prints the seconds that took: `time FILE`. Called by times.py.
+//! Reads every numeric channel of a file, and prints the seconds that took: `time-reading FILE`. Called by times.py.
 
 #![allow(clippy::print_stdout, reason = "what it prints is what it is for")]
 
