@@ -485,6 +485,7 @@ fn squares(coefficients: &Coefficients, grid: &[Point]) -> f64 {
     if sum.is_finite() { sum } else { f64::INFINITY }
 }
 
+#[allow(clippy::needless_range_loop, reason = "matrices by their indices")]
 /// Levenberg and Marquardt's method with derivatives by differences; the first so many of the six are free.
 fn fitted(start: Coefficients, grid: &[Point], unknowns: usize) -> (Coefficients, f64) {
     let mut best = start;
@@ -544,13 +545,11 @@ fn fitted(start: Coefficients, grid: &[Point], unknowns: usize) -> (Coefficients
     (best, cost)
 }
 
+#[allow(clippy::needless_range_loop, reason = "matrices by their indices")]
 /// Gauss' elimination with pivots; `None` where the matrix is singular.
 fn solved(mut a: [[f64; 6]; 6], mut b: [f64; 6], n: usize) -> Option<[f64; 6]> {
     for k in 0..n {
         let pivot = (k..n).max_by(|&i, &j| a[i][k].abs().total_cmp(&a[j][k].abs()))?;
-        if !(a[pivot][k].abs() > 0.0) {
-            return None;
-        }
         a.swap(k, pivot);
         b.swap(k, pivot);
         for i in k + 1..n {

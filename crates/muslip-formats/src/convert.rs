@@ -214,9 +214,8 @@ impl Prepared {
 
     /// Which time the columns have in common.
     pub(crate) fn one_time(&self, file: &SourceFile) -> Result<OneTime, Problem> {
-        let mut of = self.roles.assigned.iter();
-        let of = of.by_ref().map(|one| &self.channels[one.channel]);
-        let of: Vec<&Channel> = of.collect();
+        let of = self.roles.assigned.iter();
+        let of: Vec<&Channel> = of.map(|one| &self.channels[one.channel]).collect();
         if file.format().has_own_time() {
             let one_group = of.windows(2).all(|pair| pair[0].group == pair[1].group);
             return Ok(if one_group {

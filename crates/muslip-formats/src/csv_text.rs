@@ -266,7 +266,7 @@ impl Source for CsvSource {
         let mut rows = self.rows(wanted)?;
         let count = wanted.len();
         let mut goes_on = true;
-        let piece = move || -> Result<Option<Vec<Series>>, Problem> {
+        let mut piece = move || -> Result<Option<Vec<Series>>, Problem> {
             if !goes_on {
                 return Ok(None);
             }
@@ -274,7 +274,6 @@ impl Source for CsvSource {
             goes_on = rows.read(ROWS_A_PIECE, &mut columns)?;
             Ok(Some(series(columns)))
         };
-        let mut piece = piece;
         Ok(Some(Box::new(std::iter::from_fn(move || {
             piece().transpose()
         }))))

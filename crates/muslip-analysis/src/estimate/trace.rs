@@ -123,6 +123,7 @@ impl TraceRow {
 pub struct TraceWriter<W: Write + Send>(Inner<W>);
 
 #[derive(Debug)]
+#[allow(clippy::large_enum_variant, reason = "one of it in an estimate")]
 enum Inner<W: Write + Send> {
     Csv(W),
     Json {

@@ -156,6 +156,7 @@ fn streamed(arguments: &Arguments, file: &SourceFile, stream: &Stream) -> Result
 }
 
 /// Where the rows of a long file go.
+#[allow(clippy::large_enum_variant, reason = "one of it in a conversion")]
 enum Rows {
     Csv(RecordingWriter<OutputFile>),
     Parquet(ParquetTable<OutputFile>),
