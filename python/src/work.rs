@@ -45,7 +45,9 @@ pub(crate) fn channels(
 ) -> PyResult<String> {
     job::run(py, None, move |_| {
         let map = map_of(map.as_ref())?;
-        Ok(text_of(&listing(&path, map.as_ref())?.to_json()))
+        Ok(text_of(
+            &listing(&path, map.as_ref(), &mut |_| {})?.to_json(),
+        ))
     })
 }
 

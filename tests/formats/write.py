@@ -47,7 +47,8 @@ def mdf():
         return speed, wheel, ints
 
     for version in ["3.00", "3.20", "3.30", "4.00", "4.10", "4.11", "4.20"]:
-        for compression in ([0, 1, 2] if version >= "4.10" else [0]):
+        # From 3 on zstd and LZ4, each plain and transposed.
+        for compression in ([0, 1, 2, 3, 4, 5, 6] if version == "4.20" else [0, 1, 2] if version >= "4.10" else [0]):
             speed, wheel, ints = signals(version)
             file = MDF(version=version)
             file.append([speed], comment="fast")
@@ -405,8 +406,48 @@ def csv():
                 expect(name, channels)
 
 
+def shipped():
+    """Files that npTDMS (from loggers), h5py and pyarrow ship for their own tests, as they read them."""
+    import h5py
+    import nptdms
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    for path in sorted((pathlib.Path(nptdms.__file__).parent / "test" / "data").glob("*.tdms")):
+        channels = []
+        with nptdms.TdmsFile.read(path) as file:
+            for group in file.groups():
+                for channel in group.channels():
+                    values = np.asarray(channel[:])
+                    if values.dtype.kind in "iufb" and len(values):
+                        channels.append((group.name, channel.name, values, None, "", []))
+        name = f"shipped-nptdms-{path.name}"
+        (OUT / name).write_bytes(path.read_bytes())
+        expect(name, channels, faults=None)
+    for path in sorted((pathlib.Path(h5py.__file__).parent / "tests" / "data_files").glob("*.h5")):
+        channels = []
+
+        def one(key, data):
+            if isinstance(data, h5py.Dataset) and data.ndim == 1 and data.dtype.kind in "iuf" and data.size:
+                channels.append((key.rsplit("/", 1)[0] if "/" in key else "", key.rsplit("/", 1)[-1], data[:], None, "", []))
+
+        with h5py.File(path, "r") as file:
+            file.visititems(one)
+        name = f"shipped-h5py-{path.name}"
+        (OUT / name).write_bytes(path.read_bytes())
+        expect(name, channels, faults=None)
+    for path in sorted((pathlib.Path(pa.__file__).parent / "tests" / "data").rglob("*.parquet")):
+        channels = []
+        for key, column in zip((table := pq.read_table(path)).column_names, table.columns):
+            if (pa.types.is_integer(column.type) or pa.types.is_floating(column.type)) and not column.null_count and len(column):
+                channels.append(("", key, column.to_numpy(), None, "", []))
+        name = f"shipped-pyarrow-{path.name}"
+        (OUT / name).write_bytes(path.read_bytes())
+        expect(name, channels, faults=None)
+
+
 if __name__ == "__main__":
     OUT.mkdir(parents=True, exist_ok=True)
-    for step in [mdf, unsorted_mdf, tdms, mat, hdf5, arrow, csv]:
+    for step in [mdf, unsorted_mdf, tdms, mat, hdf5, arrow, csv, shipped]:
         step()
     print(f"{len(list(OUT.glob('*.json')))} files")

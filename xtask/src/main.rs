@@ -91,6 +91,15 @@ enum Command {
         /// Damaged files a format; 10,000 where it is not given, as in the tests.
         #[arg(long)]
         mutations: Option<u64>,
+        /// Instead of all that: time the readers beside those programs on 10^7 samples, and print the ratios.
+        #[arg(long, conflicts_with_all = ["mutations", "large"])]
+        times: bool,
+        /// Write the table of times, or of whose files were read, into docs/formats.md.
+        #[arg(long, conflicts_with = "large")]
+        write: bool,
+        /// Instead of all that: list and convert a CSV of so many rows and an MDF 4 of a tenth of them, and print their time and peak of memory.
+        #[arg(long, value_name = "ROWS", num_args = 0..=1, default_missing_value = "100000000", conflicts_with = "mutations")]
+        large: Option<u64>,
     },
     /// Build the Python package as a wheel, install it, and hold it against the command.
     Python,
@@ -147,7 +156,15 @@ fn main() -> anyhow::Result<()> {
             diagnoses,
             large,
         }),
-        Command::Formats { mutations } => formats::test(mutations),
+        Command::Formats {
+            times: true, write, ..
+        } => formats::times(write),
+        Command::Formats {
+            large: Some(rows), ..
+        } => formats::large(rows),
+        Command::Formats {
+            mutations, write, ..
+        } => formats::test(mutations, write),
         Command::Firmware => firmware::budgets(),
         Command::Pil {
             seconds,

@@ -70,7 +70,9 @@ pub fn run_all() -> Result<()> {
         "--",
         "--include-ignored",
     ]);
-    workspace.env(formats::FILES, files);
+    workspace
+        .env(formats::FILES, files)
+        .env(formats::PYTHON, formats::python()?);
     let tally = tests("tests of the workspace", workspace)?;
 
     python::test(&trial::under_test())?;

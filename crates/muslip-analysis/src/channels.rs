@@ -26,11 +26,16 @@ pub struct Listing {
     pub faults: Vec<String>,
 }
 
-/// Lists the channels of a file; what a map or a guess cannot find concerns other jobs, and is only listed.
+/// Lists the channels of a file; what a map or a guess cannot find concerns other jobs, and is only listed. `progress` receives the share
+/// done.
 ///
 /// # Errors
 /// [`InputError`] where nothing of the file can be read.
-pub fn listing(path: &Path, map: Option<&Map>) -> Result<Listing, InputError> {
+pub fn listing(
+    path: &Path,
+    map: Option<&Map>,
+    progress: &mut dyn FnMut(f64),
+) -> Result<Listing, InputError> {
     let mut file = SourceFile::open(path).map_err(InputError::from)?;
     let mut faults = Vec::new();
     let roles = match map.map(|map| roles::by_map(file.channels(), map)) {
@@ -41,7 +46,7 @@ pub fn listing(path: &Path, map: Option<&Map>) -> Result<Listing, InputError> {
         }
         None => roles::guess(file.channels()),
     };
-    let (channels, told) = listed(&mut file, &roles);
+    let (channels, told) = listed(&mut file, &roles, progress);
     faults.splice(0..0, told);
     let time = map.map(|map| map.time.clone()).unwrap_or_default();
     Ok(Listing {

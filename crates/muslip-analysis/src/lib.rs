@@ -1,7 +1,7 @@
 //! What is asked of the recordings of a braked wheel, for a command, a notebook or a program of one's own.
 //!
 //! [`estimate`] follows the mu-slip curve through one recording, [`campaign`] holds the estimates of many beside
-//! each other, [`channels`] lists what a file holds, [`fit`] puts the law through all points at once, [`diagnose`] finds what a simulation left out and
+//! each other, [`channels`] lists what a file holds, [`fit`] puts the law through all points at once, [`property_file`] writes it for simulations, [`records`] makes tables of results, [`diagnose`] finds what a simulation left out and
 //! predicts the drag. Results are plain structures with their JSON and, in [`wording`], their sentences; pages and
 //! plots of them are `muslip_report`'s.
 //!
@@ -50,5 +50,7 @@ pub mod diagnose;
 pub mod estimate;
 pub mod fit;
 pub mod measure;
+pub mod property_file;
+pub mod records;
 pub mod thin;
 pub mod wording;

@@ -27,6 +27,39 @@ pub struct Rig {
     pub declared_noise: BTreeMap<String, f64>,
 }
 
+/// How a channel that was measured at other times was brought onto the recording's.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum How {
+    /// On straight lines between its readings.
+    Interpolated,
+    /// By its last reading.
+    Held,
+    /// Low-passed without delay, then read off.
+    Decimated {
+        /// Edge of the low-pass in Hz.
+        edge_hz: f64,
+    },
+}
+
+/// A channel that was measured at other times than the recording's.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Resampled {
+    /// Header of its column.
+    pub column: String,
+    /// Its own sampling interval in s.
+    pub interval_s: f64,
+    /// How it was brought onto the recording's times.
+    pub how: How,
+}
+
+impl Resampled {
+    /// Whether most of its values in the recording are no readings of their own.
+    #[must_use]
+    pub fn is_coarse(&self) -> bool {
+        !matches!(self.how, How::Decimated { .. })
+    }
+}
+
 /// One recording. A missing value is `NaN`; all columns have the length of `time_s`.
 #[derive(Clone, Debug, Default)]
 pub struct Run {
@@ -48,6 +81,8 @@ pub struct Run {
     pub brake_pressure_pa: Option<Vec<f64>>,
     /// Every other numeric column: a candidate to explain a mismatch.
     pub extra: Vec<(String, Vec<f64>)>,
+    /// Channels that were measured at other times than `time_s`.
+    pub resampled: Vec<Resampled>,
 }
 
 impl Run {
@@ -78,6 +113,7 @@ impl Run {
                 .into_iter()
                 .map(|(name, x)| (name, pick(x)))
                 .collect(),
+            resampled: self.resampled,
         }
     }
 
@@ -108,6 +144,7 @@ impl Run {
                 .into_iter()
                 .map(|(name, x)| (name, mean(&x)))
                 .collect(),
+            resampled: self.resampled,
             name: self.name,
         }
     }

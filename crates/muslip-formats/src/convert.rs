@@ -8,11 +8,13 @@ use crate::error::{FormatError, Problem};
 use crate::format::Format;
 use crate::map::{Entry, Map};
 use crate::raster::{self, Done};
-use crate::roles::{self, Assigned, Roles, TIME};
+use crate::roles::{self, Assigned, Refused, Roles, TIME};
 use crate::source::{Channel, Series};
 use crate::source_file::SourceFile;
 use crate::units::{self, Quantity};
 
+/// Most gaps of a column that are told.
+pub(crate) const MOST_GAPS: usize = 100;
 /// Most rows that a raster of `rate_hz` may have.
 const MOST_ROWS: f64 = 2e8;
 
@@ -27,6 +29,17 @@ pub struct Fault {
     pub end_s: f64,
     /// What, in words.
     pub what: String,
+}
+
+/// A column whose channel was measured at other times than the recording's.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Resampled {
+    /// The column.
+    pub column: String,
+    /// The channel's own sampling interval in s.
+    pub interval_s: f64,
+    /// What was done to it.
+    pub done: Done,
 }
 
 /// A recording made of a file of another format.
@@ -44,8 +57,10 @@ pub struct Converted {
     pub notes: Vec<String>,
     /// What of it a diagnosis must know.
     pub faults: Vec<Fault>,
+    /// Which columns were measured at other times.
+    pub resampled: Vec<Resampled>,
     /// Columns of the contract that no channel became, and why.
-    pub refused: Vec<(&'static str, String)>,
+    pub refused: Vec<Refused>,
     /// The roles as they were found, as a map.
     pub map: Map,
     /// Whether the roles are a guess.
@@ -71,30 +86,14 @@ struct Ready {
 pub fn convert(file: &mut SourceFile, map: Option<&Map>) -> Result<Converted, FormatError> {
     let path = file.path().to_owned();
     let fail = |problem: Problem| problem.in_file(&path);
-    let channels = file.channels().to_vec();
-    let named = map.filter(|map| !map.channels.is_empty());
-    let mut roles = match named {
-        Some(map) => roles::by_map(&channels, map).map_err(fail)?,
-        None => roles::guess(&channels),
-    };
-    let left_out = if roles.guessed {
-        drop_unusable(&mut roles, &channels)
-    } else {
-        Vec::new()
-    };
-    if roles.assigned.is_empty() {
-        let told: Vec<&str> = roles
-            .refused
-            .iter()
-            .skip_while(|(role, _)| *role == TIME)
-            .map(|(_, reason)| reason.as_str())
-            .take(1)
-            .collect();
-        return Err(fail(Problem::whole(
-            told.first().copied().unwrap_or("the map names no channel"),
-        )));
-    }
-    let time = map.map(|map| map.time.clone()).unwrap_or_default();
+    let prepared = Prepared::of(file, map).map_err(fail)?;
+    let read_as = prepared.read_as(file);
+    let Prepared {
+        channels,
+        roles,
+        left_out,
+        time,
+    } = prepared;
     let (ready, mut faults, keeps_time) = read(file, &channels, &roles)?;
     faults.extend(left_out);
     let first_s = ready
@@ -111,21 +110,12 @@ pub fn convert(file: &mut SourceFile, map: Option<&Map>) -> Result<Converted, Fo
         columns: vec![grid.iter().map(|time| time - start_s).collect()],
         notes: Vec::new(),
         faults: Vec::new(),
+        resampled: Vec::new(),
         refused: roles.refused.clone(),
         map: roles.as_map(&channels, &time),
         guessed: roles.guessed,
     };
-    let read_as = if roles.guessed {
-        "channels guessed from names and units"
-    } else {
-        "channels by the map"
-    };
-    let start = out
-        .start_time
-        .as_ref()
-        .map_or(String::new(), |start| format!(", started {start}"));
-    out.notes
-        .push(format!("read as {}{start}; {read_as}", out.format.word()));
+    out.notes.push(read_as);
     out.notes.push(format!("{TIME}: {raster_name}"));
     for one in ready {
         let (values, done) = raster::onto(&grid, &one.times, &one.values, one.one.entry.method);
@@ -152,12 +142,152 @@ pub fn convert(file: &mut SourceFile, map: Option<&Map>) -> Result<Converted, Fo
     Ok(out)
 }
 
+/// What is known before anything is read: which channels become which columns.
+#[derive(Debug, Clone)]
+pub(crate) struct Prepared {
+    pub(crate) channels: Vec<Channel>,
+    pub(crate) roles: Roles,
+    /// What was guessed and cannot be used, in words.
+    pub(crate) left_out: Vec<String>,
+    pub(crate) time: crate::map::Time,
+}
+
+/// The time of all columns.
+pub(crate) enum OneTime {
+    /// Their channels' own, of one group.
+    Own,
+    /// One channel's readings.
+    Column(usize, Entry),
+    /// Not one.
+    Several,
+}
+
+impl Prepared {
+    pub(crate) fn of(file: &SourceFile, map: Option<&Map>) -> Result<Self, Problem> {
+        let channels = file.channels().to_vec();
+        let named = map.filter(|map| !map.channels.is_empty());
+        let mut roles = match named {
+            Some(map) => roles::by_map(&channels, map)?,
+            None => roles::guess(&channels),
+        };
+        let left_out = if roles.guessed {
+            if let Some(refused) = roles.ambiguous() {
+                return Err(Problem::whole(&refused.reason));
+            }
+            drop_unusable(&mut roles, &channels)
+        } else {
+            Vec::new()
+        };
+        if roles.assigned.is_empty() {
+            let mut refused = roles.refused.iter().filter(|one| one.column != TIME);
+            let reason = refused
+                .next()
+                .map_or("the map names no channel", |one| one.reason.as_str());
+            return Err(Problem::whole(reason));
+        }
+        Ok(Self {
+            channels,
+            roles,
+            left_out,
+            time: map.map(|map| map.time.clone()).unwrap_or_default(),
+        })
+    }
+
+    /// Factor and offset to SI of each column, and the conversion in words.
+    pub(crate) fn units(&self) -> Result<Vec<(f64, f64, String)>, Problem> {
+        let unit = |one: &Assigned| to_si(&self.channels[one.channel], &one.column, &one.entry);
+        self.roles.assigned.iter().map(unit).collect()
+    }
+
+    /// How the file is read, in words.
+    pub(crate) fn read_as(&self, file: &SourceFile) -> String {
+        let read_as = if self.roles.guessed {
+            "channels guessed from names and units"
+        } else {
+            "channels by the map"
+        };
+        let start = file
+            .start_time()
+            .map_or(String::new(), |start| format!(", started {start}"));
+        format!("read as {}{start}; {read_as}", file.format().word())
+    }
+
+    /// Which time the columns have in common.
+    pub(crate) fn one_time(&self, file: &SourceFile) -> Result<OneTime, Problem> {
+        let of = self.roles.assigned.iter();
+        let of: Vec<&Channel> = of.map(|one| &self.channels[one.channel]).collect();
+        if file.format().has_own_time() {
+            let one_group = of.windows(2).all(|pair| pair[0].group == pair[1].group);
+            return Ok(if one_group {
+                OneTime::Own
+            } else {
+                OneTime::Several
+            });
+        }
+        let times = Times::new(&self.channels, &self.roles);
+        let mut one: Option<(usize, Entry)> = None;
+        for channel in of {
+            let place = times.place(channel).map_err(Problem::whole)?;
+            if one.as_ref().is_some_and(|one| one.0 != place.0) {
+                return Ok(OneTime::Several);
+            }
+            one = Some(place);
+        }
+        Ok(one.map_or(OneTime::Several, |(at, entry)| OneTime::Column(at, entry)))
+    }
+}
+
+/// Brings readings to SI, those that are invalid to `NaN`; answers with how many are.
+pub(crate) fn bring(
+    values: &mut [f64],
+    invalid: Option<Vec<bool>>,
+    entry: &Entry,
+    factor: f64,
+    offset: f64,
+) -> u64 {
+    for value in &mut *values {
+        *value = entry.scale * (factor * *value + offset) + entry.offset;
+        if !value.is_finite() {
+            *value = f64::NAN;
+        }
+    }
+    let mut count = 0;
+    let flags = invalid.iter().flatten();
+    for (value, _) in values
+        .iter_mut()
+        .zip(flags)
+        .filter(|(_, invalid)| **invalid)
+    {
+        *value = f64::NAN;
+        count += 1;
+    }
+    count
+}
+
+/// What was done to a column, in a line.
+pub(crate) fn column_note(
+    column: &str,
+    channel: &Channel,
+    unit: &str,
+    done: &str,
+    empty: u64,
+    invalid: u64,
+) -> String {
+    let mut note = format!("{column}: {}{unit}; {done}", channel.shown());
+    if empty > 0 {
+        note.push_str(&format!("; {empty} empty"));
+    }
+    if invalid > 0 {
+        note.push_str(&format!("; {invalid} readings invalid in the file"));
+    }
+    note
+}
+
 /// A column that no work requires and that was only guessed is left out where its unit does not do; answers with what was.
 fn drop_unusable(roles: &mut Roles, channels: &[Channel]) -> Vec<String> {
-    const OPTIONAL: [&str; 2] = ["brake_torque_nm", "brake_pressure_pa"];
     let mut told = Vec::new();
     roles.assigned.retain(|one| {
-        let optional = OPTIONAL.contains(&one.column.as_str());
+        let optional = roles::role(&one.column).is_some_and(|role| !role.required);
         let usable = channels
             .get(one.channel)
             .map(|channel| to_si(channel, &one.column, &one.entry));
@@ -169,12 +299,6 @@ fn drop_unusable(roles: &mut Roles, channels: &[Channel]) -> Vec<String> {
             _ => true,
         }
     });
-    // Several that it may be are no less worth a word.
-    let several = roles
-        .refused
-        .iter()
-        .filter(|(role, reason)| OPTIONAL.contains(role) && reason.contains(" may be "));
-    told.extend(several.map(|(_, reason)| format!("left out: {reason}")));
     told
 }
 
@@ -187,28 +311,32 @@ impl Converted {
             })
         };
         let (own, wanted) = (rate(&one.times), rate(grid));
-        let method = one.one.entry.method.word();
         let done_in_words = match done {
             Done::Kept => format!("{own}, kept"),
-            Done::Interpolated => format!("{own}, brought onto {wanted} ({method})"),
-            Done::Decimated => format!("{own}, low-passed and decimated to {wanted}"),
+            Done::Interpolated(method) => {
+                format!("{own}, brought onto {wanted} ({})", method.word())
+            }
+            Done::Decimated { .. } => format!("{own}, low-passed and decimated to {wanted}"),
         };
-        let empty = values.iter().filter(|value| value.is_nan()).count();
-        let mut note = format!(
-            "{column}: {}{}; {done_in_words}",
-            one.channel.shown(),
-            one.unit
-        );
-        if empty > 0 {
-            note.push_str(&format!("; {empty} empty"));
-        }
-        if one.invalid > 0 {
-            note.push_str(&format!("; {} readings invalid in the file", one.invalid));
-        }
-        self.notes.push(note);
+        let empty = values.iter().filter(|value| value.is_nan()).count() as u64;
+        self.notes.push(column_note(
+            column,
+            &one.channel,
+            &one.unit,
+            &done_in_words,
+            empty,
+            one.invalid,
+        ));
         let (Some(first), Some(last)) = (one.times.first(), one.times.last()) else {
             return;
         };
+        if let Some(interval_s) = raster::interval_s(&one.times).filter(|_| done != Done::Kept) {
+            self.resampled.push(Resampled {
+                column: column.clone(),
+                interval_s,
+                done,
+            });
+        }
         let mut fault = |start: f64, end: f64, what: String| {
             self.faults.push(Fault {
                 column: column.clone(),
@@ -219,14 +347,15 @@ impl Converted {
         };
         match done {
             Done::Kept => {}
-            Done::Interpolated => fault(
+            Done::Interpolated(method) => fault(
                 *first,
                 *last,
                 format!(
-                    "measured at {own}, interpolated ({method}) onto {wanted}: no more is known of it than its own readings"
+                    "measured at {own}, interpolated ({}) onto {wanted}: no more is known of it than its own readings",
+                    method.word()
                 ),
             ),
-            Done::Decimated => fault(
+            Done::Decimated { .. } => fault(
                 *first,
                 *last,
                 format!("measured at {own}, low-passed without delay and decimated to {wanted}"),
@@ -237,7 +366,7 @@ impl Converted {
             .times
             .windows(2)
             .filter(|pair| pair[1] - pair[0] > longest)
-            .take(100)
+            .take(MOST_GAPS)
         {
             fault(
                 pair[0],
@@ -259,7 +388,7 @@ impl Converted {
 }
 
 /// Three digits behind the point at most.
-fn rounded(value: f64) -> f64 {
+pub(crate) fn rounded(value: f64) -> f64 {
     (value * 1e3).round() / 1e3
 }
 
@@ -299,21 +428,7 @@ fn read(
                 format!("{} readings and {} time stamps", values.len(), stamps.len()),
             )));
         }
-        for value in &mut values {
-            *value = one.entry.scale * (factor * *value + offset) + one.entry.offset;
-            if !value.is_finite() {
-                *value = f64::NAN;
-            }
-        }
-        let mut count = 0;
-        for (value, _) in values
-            .iter_mut()
-            .zip(invalid.iter().flatten())
-            .filter(|(_, invalid)| **invalid)
-        {
-            *value = f64::NAN;
-            count += 1;
-        }
+        let count = bring(&mut values, invalid, &one.entry, factor, offset);
         let (stamps, values, dropped) = timed(stamps, values);
         if dropped > 0 {
             faults.push(format!(
@@ -365,26 +480,29 @@ fn ordered(times: &[f64], channel: &Channel, own: bool, shared: &Times<'_>) -> R
     let Some(at) = times.windows(2).position(|pair| pair[1] <= pair[0]) else {
         return Ok(());
     };
-    let verb = if times[at + 1] == times[at] {
+    let timed = match (own, shared.named(channel)) {
+        (false, Some(time)) => time,
+        _ => channel,
+    };
+    Err(out_of_order(timed, at as u64 + 1, times[at], times[at + 1]))
+}
+
+/// A time that repeats or goes back, at a sample of a channel.
+pub(crate) fn out_of_order(channel: &Channel, at: u64, before: f64, now: f64) -> Problem {
+    let verb = if now == before {
         "repeats"
     } else {
         "goes back"
-    };
-    let name = match (own, shared.named(channel)) {
-        (false, Some(time)) => time.shown(),
-        _ => channel.shown(),
     };
     let group = if channel.group.is_empty() {
         String::new()
     } else {
         format!("group {}, ", channel.group)
     };
-    Err(Problem::whole(format!(
-        "{group}channel {name}: its time {verb} at sample {}: {} s after {} s",
-        at + 1,
-        times[at + 1],
-        times[at]
-    )))
+    Problem::whole(format!(
+        "{group}channel {}: its time {verb} at sample {at}: {now} s after {before} s",
+        channel.shown()
+    ))
 }
 
 /// Times of formats that have none of their own: of the column of time, or of the channel that looks like one in the same group.
@@ -423,8 +541,9 @@ impl<'a> Times<'a> {
             (Some(time), _) => Ok((in_group[time.channel], time.entry)),
             (None, Some(time)) => Ok((time.channel, time.entry.clone())),
             (None, None) => {
-                let refused = guessed.refused.into_iter().find(|(role, _)| *role == TIME);
-                Err(refused.map_or_else(|| "no time".to_owned(), |(_, reason)| reason))
+                let mut refused = guessed.refused.into_iter();
+                let refused = refused.find(|one| one.column == TIME);
+                Err(refused.map_or_else(|| "no time".to_owned(), |one| one.reason))
             }
         }
     }

@@ -8,7 +8,7 @@ use encoding_rs_io::{DecodeReaderBytes, DecodeReaderBytesBuilder};
 
 use crate::error::{Place, Problem};
 use crate::file_bytes::FileBytes;
-use crate::source::{Channel, Kind, Series, Source};
+use crate::source::{Channel, Kind, Pieces, Series, Source};
 use crate::time_text::stamp;
 use crate::units;
 
@@ -16,6 +16,8 @@ use crate::units;
 const HEAD_BYTES: u64 = 1 << 18;
 /// Lines of the head that are looked at.
 const HEAD_LINES: usize = 400;
+/// Rows of a piece.
+const ROWS_A_PIECE: usize = 1 << 16;
 /// Longest line, in bytes: what has longer ones is no table.
 const LONGEST_LINE: u64 = 1 << 24;
 
@@ -119,9 +121,8 @@ impl CsvSource {
     fn lines(&self) -> Result<Lines, Problem> {
         let mut file = &self.file;
         file.seek(SeekFrom::Start(0))?;
-        let text = decoder(self.encoding, self.file.try_clone()?);
         let mut lines = Lines {
-            text: BufReader::with_capacity(1 << 16, text),
+            text: Text::new(self.encoding, self.file.try_clone()?),
             line: String::new(),
             number: 0,
         };
@@ -148,6 +149,99 @@ impl CsvSource {
         }
         Ok(rows)
     }
+
+    /// The rows of some columns.
+    fn rows<'a>(&'a self, wanted: &[usize]) -> Result<Rows<'a>, Problem> {
+        for &column in wanted {
+            let text = self
+                .cells
+                .get(column)
+                .is_none_or(|&cells| cells == Cells::Text);
+            if text {
+                let name = self.layout.names.get(column).cloned().unwrap_or_default();
+                return Err(Problem::of(name, "its cells are text, not numbers"));
+            }
+        }
+        Ok(Rows {
+            source: self,
+            lines: self.lines()?,
+            wanted: wanted.to_vec(),
+            first_stamp: None,
+            spans: Vec::new(),
+        })
+    }
+}
+
+/// A pass over the rows of some columns.
+struct Rows<'a> {
+    source: &'a CsvSource,
+    lines: Lines,
+    wanted: Vec<usize>,
+    /// Second of the first time stamp: the others count from there.
+    first_stamp: Option<i64>,
+    spans: Vec<(usize, usize)>,
+}
+
+impl Rows<'_> {
+    /// Appends so many rows at most to the columns; false at the end of the text.
+    fn read(&mut self, most: usize, columns: &mut [Vec<f64>]) -> Result<bool, Problem> {
+        let CsvSource { layout, cells, .. } = self.source;
+        let mut rows = 0;
+        while rows < most {
+            if !self.lines.next()? {
+                return Ok(false);
+            }
+            let line = self.lines.line.as_str();
+            if is_blank(line) {
+                continue;
+            }
+            rows += 1;
+            spans(line, layout.delimiter, &mut self.spans);
+            if self.spans.len() != layout.columns {
+                let cell = self.spans.len().min(layout.columns);
+                let at = self.spans.get(cell).map_or(line.len(), |span| span.0);
+                return Err(Problem {
+                    place: self.lines.place(at),
+                    reason: format!(
+                        "{} cells where the header has {}",
+                        self.spans.len(),
+                        layout.columns
+                    ),
+                });
+            }
+            for (&column, values) in self.wanted.iter().zip(&mut *columns) {
+                let (from, to) = self.spans[column];
+                let cell = unquoted(&line[from..to]);
+                let value = match cells[column] {
+                    Cells::Stamps if is_missing(&cell) => Some(f64::NAN),
+                    Cells::Stamps => stamp(&cell).map(|(second, fraction)| {
+                        let first = *self.first_stamp.get_or_insert(second);
+                        (second - first) as f64 + fraction
+                    }),
+                    Cells::Truths => truth(&cell).or_else(|| number(&cell, layout.decimal_comma)),
+                    Cells::Numbers | Cells::Text => number(&cell, layout.decimal_comma),
+                };
+                let Some(value) = value else {
+                    let shown: String = cell.chars().take(40).collect();
+                    return Err(Problem {
+                        place: self.lines.place(from),
+                        reason: format!("{}: {shown:?} is not a number", layout.names[column]),
+                    });
+                };
+                values.push(value);
+            }
+        }
+        Ok(true)
+    }
+}
+
+/// Columns as series.
+fn series(columns: Vec<Vec<f64>>) -> Vec<Series> {
+    let of = |values| Series {
+        values,
+        ..Series::default()
+    };
+    columns.into_iter().map(of).collect()
 }
 
 impl Source for CsvSource {
@@ -160,69 +254,29 @@ impl Source for CsvSource {
     }
 
     fn read(&mut self, wanted: &[usize]) -> Result<Vec<Series>, Problem> {
-        for &column in wanted {
-            let text = self
-                .cells
-                .get(column)
-                .is_none_or(|&cells| cells == Cells::Text);
-            if text {
-                let name = self.layout.names.get(column).cloned().unwrap_or_default();
-                return Err(Problem::of(name, "its cells are text, not numbers"));
+        let counted = self.channels.first().map_or(0, |channel| channel.samples);
+        let rows = usize::try_from(counted).unwrap_or(0);
+        // Each row was seen once, so there is room for as many.
+        let mut columns: Vec<Vec<f64>> = wanted.iter().map(|_| Vec::with_capacity(rows)).collect();
+        self.rows(wanted)?.read(usize::MAX, &mut columns)?;
+        Ok(series(columns))
+    }
+
+    fn pieces(&self, wanted: &[usize]) -> Result<Option<Pieces<'_>>, Problem> {
+        let mut rows = self.rows(wanted)?;
+        let count = wanted.len();
+        let mut goes_on = true;
+        let mut piece = move || -> Result<Option<Vec<Series>>, Problem> {
+            if !goes_on {
+                return Ok(None);
             }
-        }
-        let mut columns = vec![Vec::new(); wanted.len()];
-        let mut first_stamp = None;
-        let mut lines = self.lines()?;
-        let mut row: Vec<(usize, usize)> = Vec::new();
-        while lines.next()? {
-            if is_blank(&lines.line) {
-                continue;
-            }
-            spans(&lines.line, self.layout.delimiter, &mut row);
-            if row.len() != self.layout.columns {
-                let cell = row.len().min(self.layout.columns);
-                let at = row.get(cell).map_or(lines.line.len(), |span| span.0);
-                return Err(Problem {
-                    place: lines.place(at),
-                    reason: format!(
-                        "{} cells where the header has {}",
-                        row.len(),
-                        self.layout.columns
-                    ),
-                });
-            }
-            for (&column, values) in wanted.iter().zip(&mut columns) {
-                let (from, to) = row[column];
-                let cell = unquoted(&lines.line[from..to]);
-                let value = match self.cells[column] {
-                    Cells::Stamps if is_missing(&cell) => Some(f64::NAN),
-                    Cells::Stamps => stamp(&cell).map(|(second, fraction)| {
-                        let first = *first_stamp.get_or_insert(second);
-                        (second - first) as f64 + fraction
-                    }),
-                    Cells::Truths => {
-                        truth(&cell).or_else(|| number(&cell, self.layout.decimal_comma))
-                    }
-                    Cells::Numbers | Cells::Text => number(&cell, self.layout.decimal_comma),
-                };
-                let Some(value) = value else {
-                    let shown: String = cell.chars().take(40).collect();
-                    return Err(Problem {
-                        place: lines.place(from),
-                        reason: format!("{}: {shown:?} is not a number", self.layout.names[column]),
-                    });
-                };
-                values.push(value);
-            }
-        }
-        Ok(columns
-            .into_iter()
-            .map(|values| Series {
-                time_s: None,
-                values,
-                invalid: None,
-            })
-            .collect())
+            let mut columns = vec![Vec::new(); count];
+            goes_on = rows.read(ROWS_A_PIECE, &mut columns)?;
+            Ok(Some(series(columns)))
+        };
+        Ok(Some(Box::new(std::iter::from_fn(move || {
+            piece().transpose()
+        }))))
     }
 
     fn faults(&self) -> Vec<String> {
@@ -230,9 +284,44 @@ impl Source for CsvSource {
     }
 }
 
+/// A file as text.
+enum Text {
+    /// As it lies there.
+    Utf8(BufReader<File>),
+    /// Recoded.
+    Other(BufReader<DecodeReaderBytes<File, Vec<u8>>>),
+}
+
+impl Text {
+    fn new(encoding: &'static Encoding, file: File) -> Self {
+        if encoding == encoding_rs::UTF_8 {
+            return Self::Utf8(BufReader::with_capacity(1 << 16, file));
+        }
+        Self::Other(BufReader::with_capacity(1 << 16, decoder(encoding, file)))
+    }
+
+    /// Appends the next line to an empty one, with its end; answers with its bytes in this encoding.
+    fn next(&mut self, line: &mut String) -> Result<u64, Problem> {
+        let read = match self {
+            Self::Utf8(text) => {
+                let mut bytes = std::mem::take(line).into_bytes();
+                let read = text.take(LONGEST_LINE).read_until(b'\n', &mut bytes)?;
+                *line = match String::from_utf8(bytes) {
+                    Ok(line) => line,
+                    // As a decoder does: what is no character is marked as such.
+                    Err(error) => String::from_utf8_lossy(error.as_bytes()).into_owned(),
+                };
+                read
+            }
+            Self::Other(text) => text.take(LONGEST_LINE).read_line(line)?,
+        };
+        Ok(read as u64)
+    }
+}
+
 /// The text line by line, each with its number.
 struct Lines {
-    text: BufReader<DecodeReaderBytes<File, Vec<u8>>>,
+    text: Text,
     line: String,
     number: u64,
 }
@@ -241,10 +330,8 @@ impl Lines {
     /// Goes to the next line; false at the end.
     fn next(&mut self) -> Result<bool, Problem> {
         self.line.clear();
-        let read = (&mut self.text)
-            .take(LONGEST_LINE)
-            .read_line(&mut self.line)?;
-        if read as u64 == LONGEST_LINE {
+        let read = self.text.next(&mut self.line)?;
+        if read == LONGEST_LINE {
             return Err(Problem {
                 place: Place::Text {
                     line: self.number + 1,
@@ -255,6 +342,9 @@ impl Lines {
         }
         while self.line.ends_with(['\n', '\r']) {
             self.line.pop();
+        }
+        if self.number == 0 && self.line.starts_with('\u{feff}') {
+            self.line.remove(0);
         }
         self.number += 1;
         Ok(read > 0)
@@ -336,6 +426,12 @@ fn spans(line: &str, delimiter: Option<char>, spans: &mut Vec<(usize, usize)>) {
 }
 
 fn cell_count(line: &str, delimiter: Option<char>) -> usize {
+    if let Some(delimiter) = delimiter
+        && !line.as_bytes().contains(&b'"')
+    {
+        let delimiter = delimiter as u32 as u8;
+        return 1 + line.bytes().filter(|&byte| byte == delimiter).count();
+    }
     let mut all = Vec::new();
     spans(line, delimiter, &mut all);
     all.len()
@@ -373,19 +469,27 @@ fn is_missing(cell: &str) -> bool {
 
 /// A cell as a number, `NaN` where it is missing.
 fn number(cell: &str, decimal_comma: bool) -> Option<f64> {
+    let first = cell.as_bytes().first().copied().unwrap_or(b' ');
+    if first.is_ascii_digit() || matches!(first, b'+' | b'-' | b'.' | b',') {
+        let value = if decimal_comma {
+            with_comma(cell)
+        } else {
+            cell.parse().ok()
+        };
+        return value.or_else(|| is_missing(cell).then_some(f64::NAN));
+    }
     if is_missing(cell) {
         return Some(f64::NAN);
     }
-    let first = cell.as_bytes().first()?;
-    if !first.is_ascii_digit()
-        && !matches!(first, b'+' | b'-' | b'.' | b',')
-        && !cell.to_ascii_lowercase().starts_with("inf")
-    {
-        return None;
-    }
-    if !decimal_comma {
-        return cell.parse().ok();
-    }
+    let infinite = cell
+        .as_bytes()
+        .first_chunk::<3>()
+        .is_some_and(|start| start.eq_ignore_ascii_case(b"inf"));
+    infinite.then(|| cell.parse().ok()).flatten()
+}
+
+/// A number whose decimals stand behind a comma.
+fn with_comma(cell: &str) -> Option<f64> {
     let Some((whole, rest)) = cell.split_once(',') else {
         // Without a comma a point parts thousands, or it is a whole number.
         return match cell.contains('.') {
@@ -396,7 +500,21 @@ fn number(cell: &str, decimal_comma: bool) -> Option<f64> {
     if rest.contains(['.', ',']) {
         return None;
     }
-    format!("{}.{rest}", thousands(whole)?).parse().ok()
+    if whole.contains('.') {
+        return format!("{}.{rest}", thousands(whole)?).parse().ok();
+    }
+    // Most numbers are short: no allocation for them.
+    let mut plain = [0_u8; 40];
+    match plain.get_mut(..cell.len()) {
+        Some(plain) => {
+            plain.copy_from_slice(cell.as_bytes());
+            if let Some(comma) = plain.get_mut(whole.len()) {
+                *comma = b'.';
+            }
+            str::from_utf8(plain).ok()?.parse().ok()
+        }
+        None => format!("{whole}.{rest}").parse().ok(),
+    }
 }
 
 /// Digits in threes parted by points, without the points.

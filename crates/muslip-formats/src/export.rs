@@ -1,99 +1,229 @@
-//! A converted recording as Parquet.
+//! Tables as Parquet: recordings, estimates, diagnoses.
 
 use std::io::{self, Write};
 
 use crate::convert::Converted;
 
-/// Writes the columns as `DOUBLE`, a missing value as null, the SI unit and what was done as metadata (`muslip.read`, one line each).
-///
-/// # Errors
-/// What the sink answers; [`io::ErrorKind::Unsupported`] in a build without the feature `parquet`.
-#[cfg(not(feature = "parquet"))]
-pub fn write_parquet<W: Write + Send>(_sink: W, _converted: &Converted) -> io::Result<()> {
-    Err(io::Error::new(
-        io::ErrorKind::Unsupported,
-        "this build has no Parquet",
-    ))
+/// Rows of a recording that are in memory a second time while they are written.
+const GROUP_ROWS: usize = 1 << 20;
+
+/// What a column of a table holds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ColumnKind {
+    /// Numbers (`DOUBLE`).
+    Numbers,
+    /// Text (`STRING`).
+    Texts,
+    /// Truths (`BOOLEAN`).
+    Truths,
+}
+
+/// Some rows of a column.
+#[derive(Debug, Clone, Copy)]
+pub enum Cells<'a> {
+    /// Numbers; one that is not finite is missing.
+    Numbers(&'a [f64]),
+    /// Texts.
+    Texts(&'a [Option<String>]),
+    /// Truths.
+    Truths(&'a [Option<bool>]),
 }
 
 /// Writes the columns as `DOUBLE`, a missing value as null, what was done as metadata (`muslip.read`, one line each).
 ///
 /// # Errors
 /// What the sink answers; [`io::ErrorKind::Unsupported`] in a build without the feature `parquet`.
+pub fn write_parquet<W: Write + Send>(sink: W, converted: &Converted) -> io::Result<W> {
+    let columns: Vec<(&str, ColumnKind)> = converted
+        .names
+        .iter()
+        .map(|name| (name.as_str(), ColumnKind::Numbers))
+        .collect();
+    let mut table = ParquetTable::new(sink, &columns)?;
+    table.note("muslip.read", &converted.notes.join("\n"));
+    if let Some(start) = &converted.start_time {
+        table.note("start_time", start);
+    }
+    let rows = converted.columns.first().map_or(0, Vec::len);
+    let mut from = 0;
+    while from < rows {
+        let to = (from + GROUP_ROWS).min(rows);
+        let group: Vec<Cells<'_>> = converted
+            .columns
+            .iter()
+            .map(|column| Cells::Numbers(column.get(from..to).unwrap_or_default()))
+            .collect();
+        table.rows(&group)?;
+        from = to;
+    }
+    table.finish()
+}
+
+/// A table that is written some rows at a time.
+#[cfg(not(feature = "parquet"))]
+#[derive(Debug)]
+pub struct ParquetTable<W: Write + Send> {
+    sink: W,
+}
+
+#[cfg(not(feature = "parquet"))]
+impl<W: Write + Send> ParquetTable<W> {
+    /// Starts a table.
+    ///
+    /// # Errors
+    /// [`io::ErrorKind::Unsupported`]: this build has no Parquet.
+    pub fn new(_sink: W, _columns: &[(&str, ColumnKind)]) -> io::Result<Self> {
+        Err(io::Error::new(
+            io::ErrorKind::Unsupported,
+            "this build has no Parquet",
+        ))
+    }
+
+    /// Adds to what stands beside the table.
+    pub fn note(&mut self, _key: &str, _text: &str) {}
+
+    /// Writes rows.
+    ///
+    /// # Errors
+    /// None: there is no such table.
+    pub fn rows(&mut self, _columns: &[Cells<'_>]) -> io::Result<()> {
+        Ok(())
+    }
+
+    /// Ends the table.
+    ///
+    /// # Errors
+    /// None: there is no such table.
+    pub fn finish(self) -> io::Result<W> {
+        Ok(self.sink)
+    }
+}
+
 #[cfg(feature = "parquet")]
-pub fn write_parquet<W: Write + Send>(sink: W, converted: &Converted) -> io::Result<()> {
+pub use with_parquet::ParquetTable;
+
+#[cfg(feature = "parquet")]
+mod with_parquet {
+    use std::fmt;
+    use std::io::{self, Write};
     use std::sync::Arc;
 
-    use parquet::basic::{Compression, Repetition, Type as Physical, ZstdLevel};
-    use parquet::data_type::DoubleType;
+    use parquet::basic::{Compression, LogicalType, Repetition, Type as Physical, ZstdLevel};
+    use parquet::data_type::{BoolType, ByteArray, ByteArrayType, DoubleType};
     use parquet::file::metadata::KeyValue;
     use parquet::file::properties::WriterProperties;
     use parquet::file::writer::SerializedFileWriter;
     use parquet::schema::types::Type;
 
-    /// Rows that are in memory a second time while they are written.
-    const GROUP_ROWS: usize = 1 << 20;
-    let fields: Result<Vec<_>, _> = converted
-        .names
-        .iter()
-        .map(|name| {
-            Type::primitive_type_builder(name, Physical::DOUBLE)
-                .with_repetition(Repetition::OPTIONAL)
-                .build()
-                .map(Arc::new)
-        })
-        .collect();
-    let schema = fields.and_then(|fields| {
-        Type::group_type_builder("recording")
-            .with_fields(fields)
-            .build()
-    });
-    let schema = Arc::new(schema.map_err(io::Error::other)?);
-    let mut metadata = vec![KeyValue::new(
-        "muslip.read".to_owned(),
-        converted.notes.join("\n"),
-    )];
-    metadata.extend(
-        converted
-            .start_time
-            .clone()
-            .map(|start| KeyValue::new("start_time".to_owned(), start)),
-    );
-    let properties = WriterProperties::builder()
-        .set_compression(Compression::ZSTD(ZstdLevel::default()))
-        .set_key_value_metadata(Some(metadata))
-        .build();
-    let mut file =
-        SerializedFileWriter::new(sink, schema, Arc::new(properties)).map_err(io::Error::other)?;
-    let rows = converted.columns.first().map_or(0, Vec::len);
-    let mut from = 0;
-    while from < rows {
-        let to = (from + GROUP_ROWS).min(rows);
-        let mut group = file.next_row_group().map_err(io::Error::other)?;
-        let mut columns = converted.columns.iter();
-        while let Some(mut writer) = group.next_column().map_err(io::Error::other)? {
-            let column = columns
-                .next()
-                .and_then(|column| column.get(from..to))
-                .unwrap_or_default();
-            let levels: Vec<i16> = column
-                .iter()
-                .map(|value| i16::from(value.is_finite()))
-                .collect();
-            let values: Vec<f64> = column
-                .iter()
-                .copied()
-                .filter(|value| value.is_finite())
-                .collect();
-            let batch = writer
-                .typed::<DoubleType>()
-                .write_batch(&values, Some(&levels), None);
-            batch.map_err(io::Error::other)?;
-            writer.close().map_err(io::Error::other)?;
-        }
-        group.close().map_err(io::Error::other)?;
-        from = to;
+    use super::{Cells, ColumnKind};
+
+    /// A table that is written some rows at a time: every column may have missing values, which are nulls.
+    pub struct ParquetTable<W: Write + Send> {
+        file: SerializedFileWriter<W>,
     }
-    file.close().map_err(io::Error::other)?;
-    Ok(())
+
+    impl<W: Write + Send> fmt::Debug for ParquetTable<W> {
+        fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+            out.debug_struct("ParquetTable").finish_non_exhaustive()
+        }
+    }
+
+    impl<W: Write + Send> ParquetTable<W> {
+        /// Starts a table.
+        ///
+        /// # Errors
+        /// What the sink answers.
+        pub fn new(sink: W, columns: &[(&str, ColumnKind)]) -> io::Result<Self> {
+            let field = |&(name, kind): &(&str, ColumnKind)| {
+                let (physical, logical) = match kind {
+                    ColumnKind::Numbers => (Physical::DOUBLE, None),
+                    ColumnKind::Texts => (Physical::BYTE_ARRAY, Some(LogicalType::String)),
+                    ColumnKind::Truths => (Physical::BOOLEAN, None),
+                };
+                Type::primitive_type_builder(name, physical)
+                    .with_repetition(Repetition::OPTIONAL)
+                    .with_logical_type(logical)
+                    .build()
+                    .map(Arc::new)
+            };
+            let fields: Result<Vec<_>, _> = columns.iter().map(field).collect();
+            let schema = fields.and_then(|fields| {
+                Type::group_type_builder("table")
+                    .with_fields(fields)
+                    .build()
+            });
+            let schema = Arc::new(schema.map_err(io::Error::other)?);
+            let properties = WriterProperties::builder()
+                .set_compression(Compression::ZSTD(ZstdLevel::default()))
+                .build();
+            let file = SerializedFileWriter::new(sink, schema, Arc::new(properties));
+            Ok(Self {
+                file: file.map_err(io::Error::other)?,
+            })
+        }
+
+        /// Adds to what stands beside the table: a text under a key.
+        pub fn note(&mut self, key: &str, text: &str) {
+            let note = KeyValue::new(key.to_owned(), text.to_owned());
+            self.file.append_key_value_metadata(note);
+        }
+
+        /// Writes rows: as many columns as the table has, all of one length.
+        ///
+        /// # Errors
+        /// What the sink answers.
+        pub fn rows(&mut self, columns: &[Cells<'_>]) -> io::Result<()> {
+            let mut group = self.file.next_row_group().map_err(io::Error::other)?;
+            let mut columns = columns.iter();
+            while let Some(mut writer) = group.next_column().map_err(io::Error::other)? {
+                let written = match columns.next() {
+                    Some(Cells::Numbers(numbers)) => {
+                        let (levels, values) =
+                            there(numbers, |value| value.is_finite().then_some(*value));
+                        let column = writer.typed::<DoubleType>();
+                        column.write_batch(&values, Some(&levels), None)
+                    }
+                    Some(Cells::Texts(texts)) => {
+                        let text = |text: &Option<String>| text.as_deref().map(ByteArray::from);
+                        let (levels, values) = there(texts, text);
+                        let column = writer.typed::<ByteArrayType>();
+                        column.write_batch(&values, Some(&levels), None)
+                    }
+                    Some(Cells::Truths(truths)) => {
+                        let (levels, values) = there(truths, |truth| *truth);
+                        let column = writer.typed::<BoolType>();
+                        column.write_batch(&values, Some(&levels), None)
+                    }
+                    None => return Err(io::Error::from(io::ErrorKind::InvalidInput)),
+                };
+                written.map_err(io::Error::other)?;
+                writer.close().map_err(io::Error::other)?;
+            }
+            group.close().map_err(io::Error::other)?;
+            Ok(())
+        }
+
+        /// Ends the table and gives the sink back.
+        ///
+        /// # Errors
+        /// What the sink answers.
+        pub fn finish(self) -> io::Result<W> {
+            self.file.into_inner().map_err(io::Error::other)
+        }
+    }
+
+    /// Which cells are there, and what they hold.
+    fn there<T, V>(cells: &[T], value: impl Fn(&T) -> Option<V>) -> (Vec<i16>, Vec<V>) {
+        let mut values = Vec::with_capacity(cells.len());
+        let levels = cells
+            .iter()
+            .map(|cell| {
+                let value = value(cell);
+                let level = i16::from(value.is_some());
+                values.extend(value);
+                level
+            })
+            .collect();
+        (levels, values)
+    }
 }

@@ -5,6 +5,9 @@ use std::io::{Read, Seek, SeekFrom};
 
 use crate::error::Problem;
 
+/// Bytes fetched at a time, so that they stay near the processor.
+const PIECE: u64 = 1 << 18;
+
 /// A file of known length.
 #[derive(Debug)]
 pub(crate) struct FileBytes {
@@ -24,8 +27,17 @@ impl FileBytes {
 
     /// As many bytes from there as the file has, `wanted` at most.
     pub(crate) fn up_to(&self, offset: u64, wanted: u64) -> Result<Vec<u8>, Problem> {
+        let mut bytes = Vec::new();
+        self.fill(offset, wanted, &mut bytes)?;
+        Ok(bytes)
+    }
+
+    /// As [`FileBytes::up_to`], in place of what is in `bytes`.
+    fn fill(&self, offset: u64, wanted: u64, bytes: &mut Vec<u8>) -> Result<(), Problem> {
         let there = self.length.saturating_sub(offset).min(wanted);
-        let mut bytes = vec![0; usize::try_from(there).map_err(|_| too_large(offset, there))?];
+        let there = usize::try_from(there).map_err(|_| too_large(offset, there))?;
+        // What was in it is written over, so it is cleared only where it grows.
+        bytes.resize(there, 0);
         (&self.file).seek(SeekFrom::Start(offset))?;
         let mut filled = 0;
         while filled < bytes.len() {
@@ -35,7 +47,39 @@ impl FileBytes {
             }
         }
         bytes.truncate(filled);
-        Ok(bytes)
+        Ok(())
+    }
+
+    /// Exactly so many numbers, one after the other, appended; they are fetched a piece at a time.
+    #[allow(dead_code, reason = "of binary formats")]
+    pub(crate) fn numbers(
+        &self,
+        offset: u64,
+        count: u64,
+        (number, big_endian): (Number, bool),
+        out: &mut Vec<f64>,
+    ) -> Result<(), Problem> {
+        let size = number.size() as u64;
+        let end = count
+            .checked_mul(size)
+            .and_then(|bytes| bytes.checked_add(offset))
+            .filter(|&end| end <= self.length);
+        let Some(end) = end else {
+            return Err(short(offset, count, size, self.length));
+        };
+        out.reserve(usize::try_from(count).map_err(|_| too_large(offset, count))?);
+        let mut bytes = Vec::new();
+        let mut at = offset;
+        while at < end {
+            let now = (end - at).min(PIECE / size * size);
+            self.fill(at, now, &mut bytes)?;
+            if bytes.len() as u64 != now {
+                return Err(Problem::at_byte(at, "the file has become shorter"));
+            }
+            number.extend(&bytes, big_endian, out);
+            at += now;
+        }
+        Ok(())
     }
 
     #[allow(dead_code, reason = "of binary formats")]
@@ -64,6 +108,13 @@ impl FileBytes {
     pub(crate) fn file(&self) -> &File {
         &self.file
     }
+}
+
+fn short(offset: u64, count: u64, size: u64, length: u64) -> Problem {
+    Problem::at_byte(
+        offset,
+        format!("{count} numbers of {size} bytes are announced, the file ends at byte {length}"),
+    )
 }
 
 fn too_large(offset: u64, bytes: u64) -> Problem {
@@ -168,6 +219,38 @@ impl Number {
             Self::I16 | Self::U16 => 2,
             Self::I32 | Self::U32 | Self::F32 => 4,
             Self::I64 | Self::U64 | Self::F64 => 8,
+        }
+    }
+
+    /// Appends the numbers in the bytes, one after the other; a rest that is none is left.
+    pub(crate) fn extend(self, bytes: &[u8], big_endian: bool, out: &mut Vec<f64>) {
+        fn all<const N: usize>(
+            bytes: &[u8],
+            big_endian: bool,
+            out: &mut Vec<f64>,
+            number: impl Fn([u8; N]) -> f64,
+        ) {
+            let (cells, _) = bytes.as_chunks::<N>();
+            if big_endian {
+                out.extend(cells.iter().map(|&(mut cell)| {
+                    cell.reverse();
+                    number(cell)
+                }));
+            } else {
+                out.extend(cells.iter().map(|&cell| number(cell)));
+            }
+        }
+        match self {
+            Self::I8 => all(bytes, big_endian, out, |b| f64::from(i8::from_le_bytes(b))),
+            Self::I16 => all(bytes, big_endian, out, |b| f64::from(i16::from_le_bytes(b))),
+            Self::I32 => all(bytes, big_endian, out, |b| f64::from(i32::from_le_bytes(b))),
+            Self::I64 => all(bytes, big_endian, out, |b| i64::from_le_bytes(b) as f64),
+            Self::U8 => all(bytes, big_endian, out, |b| f64::from(u8::from_le_bytes(b))),
+            Self::U16 => all(bytes, big_endian, out, |b| f64::from(u16::from_le_bytes(b))),
+            Self::U32 => all(bytes, big_endian, out, |b| f64::from(u32::from_le_bytes(b))),
+            Self::U64 => all(bytes, big_endian, out, |b| u64::from_le_bytes(b) as f64),
+            Self::F32 => all(bytes, big_endian, out, |b| f64::from(f32::from_le_bytes(b))),
+            Self::F64 => all(bytes, big_endian, out, f64::from_le_bytes),
         }
     }
 

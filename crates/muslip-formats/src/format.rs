@@ -44,6 +44,11 @@ impl Format {
         }
     }
 
+    /// Whether each of its channels has a time by its group, and none is looked for among the other channels.
+    pub(crate) fn has_own_time(self) -> bool {
+        matches!(self, Self::Mdf3 | Self::Mdf4)
+    }
+
     /// Tells the format by the file's bytes, never by its name.
     ///
     /// # Errors

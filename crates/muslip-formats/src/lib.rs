@@ -2,7 +2,8 @@
 //!
 //! [`SourceFile::open`] tells the format by the file's first bytes and lists its channels; [`SourceFile::read`] reads chosen ones as `f64` with
 //! their time and validity. [`map`] and [`roles`] say which channel is which column of a recording, [`units`] brings readings to SI, [`raster`]
-//! brings channels of different rates onto one time, and [`convert`] does it all.
+//! brings channels of different rates onto one time, and [`convert`] does it all;
+//! [`stream`] does it some rows at a time where all channels share one time.
 //!
 //! | feature | format | told by |
 //! | --- | --- | --- |
@@ -46,6 +47,8 @@ pub mod raster;
 pub mod roles;
 mod source;
 mod source_file;
+mod steps;
+pub mod stream;
 #[cfg(feature = "tdms")]
 mod tdms;
 #[cfg(feature = "tdms")]
@@ -56,11 +59,11 @@ mod time_text;
 pub mod units;
 
 pub use error::{FormatError, Place, Problem};
-pub use export::write_parquet;
+pub use export::{Cells, ColumnKind, ParquetTable, write_parquet};
 pub use format::Format;
 pub use guard::quiet_panics;
-pub use source::{Channel, Kind, Series, Source};
-pub use source_file::SourceFile;
+pub use source::{Channel, Kind, Pieces, Series, Source};
+pub use source_file::{FilePieces, SourceFile};
 
 /// Most bytes that one block, column or variable may unpack to: 1 GiB.
 pub const MOST_BYTES: u64 = 1 << 30;

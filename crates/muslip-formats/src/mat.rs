@@ -13,6 +13,8 @@ use crate::error::Problem;
 use crate::file_bytes::{Cursor, FileBytes, Number};
 use crate::source::{Channel, Kind, Series, Source};
 
+/// Bytes in which the description of a matrix of numbers stands.
+const HEAD_BYTES: u64 = 1 << 12;
 /// Structures within structures that are followed.
 const DEEPEST: usize = 16;
 /// Columns of a matrix that are listed one by one.
@@ -38,6 +40,25 @@ struct Body {
     offset: u64,
     bytes: u64,
     packed: bool,
+}
+
+/// How a variable begins.
+struct Start {
+    bytes: Vec<u8>,
+    /// Whether these are all its bytes.
+    is_whole: bool,
+}
+
+impl Start {
+    /// Whether it is a matrix of numbers, which is told by its class: then all that is not numbers stands at its start.
+    fn is_numbers(&self, big: bool, packed: bool) -> bool {
+        let mut cursor = Cursor::new(&self.bytes, big);
+        if packed && tag(&mut cursor).is_none() {
+            return false;
+        }
+        let flags = element(&mut cursor).and_then(|(_, flags)| Cursor::new(flags, big).u32());
+        flags.is_some_and(|flags| (6..=15).contains(&(flags & 0xff)))
+    }
 }
 
 /// A MAT file.
@@ -245,16 +266,15 @@ impl MatSource {
                     bytes,
                     packed: kind == 15,
                 });
-                match self.body(variable) {
-                    Ok(unpacked) => {
-                        let outcome = self.variable(&unpacked, variable, big, kind == 15);
+                match self.start_of(variable, big) {
+                    Ok(start) => {
+                        let outcome = self.variable(&start, variable, big, kind == 15);
                         if let Err(problem) = outcome {
                             self.faults.push(format!(
                                 "byte {at}: a variable is damaged: {}",
                                 problem.in_words()
                             ));
                         }
-                        self.unpacked = Some((variable, unpacked));
                     }
                     Err(problem) => self
                         .faults
@@ -274,6 +294,28 @@ impl MatSource {
         Ok(())
     }
 
+    /// The first bytes of a variable, or all of them where its fields lie anywhere in it.
+    fn start_of(&mut self, variable: usize, big: bool) -> Result<Start, Problem> {
+        let Some(body) = self.bodies.get(variable).copied() else {
+            return Err(Problem::whole("no such variable"));
+        };
+        let head = self.up_to(body, HEAD_BYTES)?;
+        let is_whole = (head.len() as u64) < HEAD_BYTES;
+        let start = Start {
+            bytes: head,
+            is_whole,
+        };
+        if is_whole || start.is_numbers(big, body.packed) {
+            return Ok(start);
+        }
+        let bytes = self.body(variable)?;
+        self.unpacked = Some((variable, bytes.clone()));
+        Ok(Start {
+            bytes,
+            is_whole: true,
+        })
+    }
+
     /// The unpacked bytes of a variable.
     fn body(&mut self, variable: usize) -> Result<Vec<u8>, Problem> {
         if let Some((which, bytes)) = self.unpacked.take()
@@ -284,21 +326,26 @@ impl MatSource {
         let Some(body) = self.bodies.get(variable).copied() else {
             return Err(Problem::whole("no such variable"));
         };
-        if !body.packed {
-            return self.file.exact(body.offset, body.bytes);
-        }
-        let mut file = self.file.file();
-        file.seek(SeekFrom::Start(body.offset))?;
-        let mut unpacked = Vec::new();
-        let mut decoder = ZlibDecoder::new(file.take(body.bytes)).take(MOST_BYTES + 1);
-        let outcome = decoder.read_to_end(&mut unpacked);
-        if unpacked.len() as u64 > MOST_BYTES {
+        let unpacked = self.up_to(body, MOST_BYTES + 1)?;
+        if body.packed && unpacked.len() as u64 > MOST_BYTES {
             return Err(Problem::at_byte(
                 body.offset,
                 format!("a variable unpacks to over {MOST_BYTES} bytes"),
             ));
         }
-        match outcome {
+        Ok(unpacked)
+    }
+
+    /// The unpacked bytes of a variable, so many at most.
+    fn up_to(&self, body: Body, most: u64) -> Result<Vec<u8>, Problem> {
+        if !body.packed {
+            return self.file.exact(body.offset, body.bytes.min(most));
+        }
+        let mut file = self.file.file();
+        file.seek(SeekFrom::Start(body.offset))?;
+        let mut unpacked = Vec::new();
+        let mut decoder = ZlibDecoder::new(file.take(body.bytes)).take(most);
+        match decoder.read_to_end(&mut unpacked) {
             Ok(_) => Ok(unpacked),
             Err(error) => Err(Problem::at_byte(
                 body.offset,
@@ -310,24 +357,32 @@ impl MatSource {
     /// Lists what a top-level variable holds. A packed one has its own tag first.
     fn variable(
         &mut self,
-        bytes: &[u8],
+        start: &Start,
         variable: usize,
         big: bool,
         tagged: bool,
     ) -> Result<(), Problem> {
-        let mut cursor = Cursor::new(bytes, big);
+        let mut cursor = Cursor::new(&start.bytes, big);
+        let announced = self.bodies.get(variable).map_or(0, |body| body.bytes);
         if tagged {
-            let (kind, body) = element(&mut cursor).ok_or_else(short)?;
+            let (kind, length) = tag(&mut cursor).ok_or_else(short)?;
             if kind != 14 {
                 return Err(Problem::whole(format!("a packed element of type {kind}")));
             }
+            let there = cursor.left() as u64;
+            if start.is_whole && length > there {
+                return Err(short());
+            }
+            let body = cursor.take(length.min(there) as usize).ok_or_else(short)?;
             // The body follows its tag of eight bytes.
-            return self.matrix(body, 8, variable, big, "", None, 0);
+            let beyond = length - body.len() as u64;
+            return self.matrix(body, beyond, 8, variable, big, "", None, 0);
         }
-        self.matrix(bytes, 0, variable, big, "", None, 0)
+        let beyond = announced - announced.min(start.bytes.len() as u64);
+        self.matrix(&start.bytes, beyond, 0, variable, big, "", None, 0)
     }
 
-    /// Lists a matrix, which lies `base` bytes into its variable.
+    /// Lists a matrix, which lies `base` bytes into its variable; `beyond` of its bytes were not fetched.
     #[expect(
         clippy::too_many_arguments,
         reason = "the place of a matrix, and its name where a structure gives it"
@@ -335,6 +390,7 @@ impl MatSource {
     fn matrix(
         &mut self,
         bytes: &[u8],
+        beyond: u64,
         base: u64,
         variable: usize,
         big: bool,
@@ -419,16 +475,13 @@ impl MatSource {
             self.unread(group, &name, count, Kind::Array, "complex");
             return Ok(());
         }
-        let before = cursor.at();
-        let (kind, data) =
-            element(&mut cursor).ok_or_else(|| Problem::of(&name, "its numbers end early"))?;
-        // A small element has its body right behind its type.
-        let small = data.len() <= 4
-            && bytes.get(before..before + 4).is_some_and(|tag| {
-                let mut tag = Cursor::new(tag, big);
-                tag.u32().is_some_and(|word| word >> 16 != 0)
-            });
-        let offset = before as u64 + if small { 4 } else { 8 };
+        let ends_early = || Problem::of(&name, "its numbers end early");
+        let (kind, length) = tag(&mut cursor).ok_or_else(ends_early)?;
+        // Right behind the tag, whether that is small or not.
+        let offset = cursor.at() as u64;
+        if length > cursor.left() as u64 + beyond {
+            return Err(ends_early());
+        }
         // Numbers lie in the smallest type that holds them, whatever the class.
         let number = match kind {
             1 => Number::I8,
@@ -443,10 +496,10 @@ impl MatSource {
             13 => Number::U64,
             other => return Err(Problem::of(&name, format!("numbers of type {other}"))),
         };
-        if count.checked_mul(number.size() as u64) != Some(data.len() as u64) {
+        if count.checked_mul(number.size() as u64) != Some(length) {
             return Err(Problem::of(
                 &name,
-                format!("{} bytes hold no {count} numbers", data.len()),
+                format!("{length} bytes hold no {count} numbers"),
             ));
         }
         let rows = shape.first().copied().unwrap_or(0);
@@ -517,6 +570,7 @@ impl MatSource {
                 };
                 self.matrix(
                     body,
+                    0,
                     base + at as u64 + 8,
                     variable,
                     big,
@@ -532,6 +586,15 @@ impl MatSource {
 
 fn short() -> Problem {
     Problem::whole("it ends early")
+}
+
+/// The tag of the next element: its type, and how many bytes its body has right behind the tag.
+fn tag(cursor: &mut Cursor<'_>) -> Option<(u32, u64)> {
+    let first = cursor.u32()?;
+    if first >> 16 != 0 {
+        return Some((first & 0xffff, u64::from(first >> 16)));
+    }
+    Some((first, u64::from(cursor.u32()?)))
 }
 
 /// The next element: its type and its body. Moves to the element after it.
@@ -572,25 +635,42 @@ impl Source for MatSource {
                     ),
                 ));
             };
+            let ends_early = Problem::of(self.channels[one].shown(), "its numbers end early");
+            let mut values = Vec::new();
+            let kind = (numbers.number, numbers.big);
+            if let Some(body) = self
+                .bodies
+                .get(numbers.variable)
+                .filter(|body| !body.packed)
+            {
+                let length = numbers.count.checked_mul(numbers.number.size() as u64);
+                let end = length.and_then(|length| length.checked_add(numbers.offset));
+                if end.is_none_or(|end| end > body.bytes) {
+                    return Err(ends_early);
+                }
+                let offset = body.offset + numbers.offset;
+                self.file
+                    .numbers(offset, numbers.count, kind, &mut values)?;
+                all.push(Series {
+                    values,
+                    ..Series::default()
+                });
+                continue;
+            }
             let bytes = self.body(numbers.variable)?;
             let from = usize::try_from(numbers.offset).unwrap_or(usize::MAX);
             let length = usize::try_from(numbers.count)
                 .unwrap_or(usize::MAX)
                 .saturating_mul(numbers.number.size());
             let cells = from.checked_add(length).and_then(|to| bytes.get(from..to));
-            let values = cells.map(|cells| {
-                cells
-                    .chunks_exact(numbers.number.size())
-                    .map(|cell| numbers.number.read(cell, numbers.big))
-                    .collect()
-            });
-            let values = values
-                .ok_or_else(|| Problem::of(self.channels[one].shown(), "its numbers end early"))?;
+            let Some(cells) = cells else {
+                return Err(ends_early);
+            };
+            numbers.number.extend(cells, numbers.big, &mut values);
             self.unpacked = Some((numbers.variable, bytes));
             all.push(Series {
-                time_s: None,
                 values,
-                invalid: None,
+                ..Series::default()
             });
         }
         Ok(all)

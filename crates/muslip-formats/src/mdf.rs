@@ -11,8 +11,11 @@ use crate::MOST_BYTES;
 use crate::error::Problem;
 use crate::file_bytes::FileBytes;
 use crate::mdf_join::{Mended, mended3, mended4};
-use crate::source::{Channel, Kind, Series, Source};
+use crate::source::{Channel, Kind, Pieces, Series, Source};
 use crate::time_text::rfc3339;
+
+/// Records of a piece.
+const ROWS_A_PIECE: usize = 1 << 16;
 
 /// Where a channel is: data group, channel group, channel.
 type At = (usize, usize, usize);
@@ -163,71 +166,46 @@ impl MdfSource {
         })
     }
 
+    fn are_numbers(&self, wanted: &[usize]) -> Result<(), Problem> {
+        let mut channels = wanted.iter().filter_map(|&k| self.channels.get(k));
+        match channels.find(|channel| !channel.kind.is_number()) {
+            Some(text) => Err(Problem::of(
+                text.shown(),
+                format!("{}, not a number", text.kind.word()),
+            )),
+            None => Ok(()),
+        }
+    }
+
     fn read4(&mut self, wanted: &[usize]) -> Result<Vec<Series>, Problem> {
-        let Either::Four(file) = &self.file else {
-            return Err(Problem::whole("not MDF 4"));
-        };
-        let groups = file.data_groups();
-        let channel = |(d, c, k): At| groups.get(d)?.channel_groups.get(c)?.channels.get(k);
-        let mut times: HashMap<(usize, usize), Option<Arc<Vec<f64>>>> = HashMap::new();
-        let mut all = Vec::with_capacity(wanted.len());
+        let mut all = vec![Series::default(); wanted.len()];
+        let mut done = vec![false; wanted.len()];
+        for first in 0..wanted.len() {
+            if done[first] {
+                continue;
+            }
+            let group = self.group_of(wanted[first]);
+            // All of a group in one pass over its records.
+            let places: Vec<usize> = (first..wanted.len())
+                .filter(|&place| !done[place] && self.group_of(wanted[place]) == group)
+                .collect();
+            let members: Vec<usize> = places.iter().map(|&place| wanted[place]).collect();
+            for (place, series) in places.into_iter().zip(self.read_group(&members)?) {
+                done[place] = true;
+                all[place] = series;
+            }
+        }
         let mut faults = Vec::new();
-        for &one in wanted {
-            let listed = &self.channels[one];
-            let of = |problem: Problem| Problem::of(listed.shown(), problem.in_words());
-            let at = self.at[one];
-            let found =
-                channel(at).ok_or_else(|| Problem::of(listed.shown(), "not in the file"))?;
-            let signal = file.signal(found).map_err(problem).map_err(of)?;
-            let values = if listed.kind == Kind::Enum {
-                signal.raw_values()
-            } else {
-                signal.values()
-            };
-            let values = numbers(values.map_err(problem).map_err(of)?).map_err(of)?;
-            let invalid = signal
-                .validity()
-                .map(|valid| valid.into_iter().map(|valid| !valid).collect());
-            let group = (at.0, at.1);
-            let time = match times.get(&group) {
-                Some(time) => time.clone(),
-                None => {
-                    let time = groups
-                        .get(at.0)
-                        .and_then(|data| data.channel_groups.get(at.1))
-                        .and_then(|one| {
-                            let mut masters = one.channels.iter();
-                            masters.find(|channel| {
-                                channel.is_master() && channel.sync_type == SyncType::Time
-                            })
-                        });
-                    let time = match time {
-                        Some(master) => {
-                            let signal = file.signal(master).map_err(problem).map_err(of)?;
-                            let mut values = numbers(signal.values().map_err(problem).map_err(of)?)
-                                .map_err(of)?;
-                            let factor = crate::units::of(&master.unit)
-                                .filter(|unit| unit.quantity == crate::units::Quantity::Time);
-                            if let Some(unit) = factor.filter(|unit| unit.factor != 1.0) {
-                                values.iter_mut().for_each(|value| *value *= unit.factor);
-                            }
-                            Some(Arc::new(values))
-                        }
-                        None => None,
-                    };
-                    times.insert(group, time.clone());
-                    time
-                }
-            };
-            let announced = self.announced.get(&group).copied().unwrap_or(0);
-            if (values.len() as u64) < announced {
+        for (&one, series) in wanted.iter().zip(&all) {
+            let announced = self.announced.get(&self.group_of(one)).copied();
+            let announced = announced.unwrap_or(0);
+            if (series.values.len() as u64) < announced {
                 faults.push(format!(
                     "{}: {} of {announced} announced readings are there",
-                    listed.shown(),
-                    values.len()
+                    self.channels[one].shown(),
+                    series.values.len()
                 ));
             }
-            all.push(whole(listed, values, time, invalid)?);
         }
         for fault in faults {
             if !self.faults.contains(&fault) {
@@ -235,6 +213,124 @@ impl MdfSource {
             }
         }
         Ok(all)
+    }
+
+    fn group_of(&self, channel: usize) -> (usize, usize) {
+        let (data, group, _) = self.at[channel];
+        (data, group)
+    }
+
+    /// Channels of one group.
+    fn read_group(&self, members: &[usize]) -> Result<Vec<Series>, Problem> {
+        if let Some(pieces) = self.pieces4(members)? {
+            let mut times = None::<Vec<f64>>;
+            let mut all = vec![Series::default(); members.len()];
+            for piece in pieces {
+                let piece = piece?;
+                if let Some(more) = piece.first().and_then(|one| one.time_s.as_deref()) {
+                    times.get_or_insert_default().extend(more);
+                }
+                for (one, more) in all.iter_mut().zip(piece) {
+                    if let Some(flags) = more.invalid {
+                        let flagged = one.invalid.get_or_insert_default();
+                        flagged.resize(one.values.len(), false);
+                        flagged.extend(flags);
+                    }
+                    one.values.extend(more.values);
+                }
+            }
+            let times = times.map(Arc::new);
+            for one in &mut all {
+                if let Some(flags) = &mut one.invalid {
+                    flags.resize(one.values.len(), false);
+                }
+                one.time_s.clone_from(&times);
+            }
+            return Ok(all);
+        }
+        let Either::Four(file) = &self.file else {
+            return Err(Problem::whole("not MDF 4"));
+        };
+        let mut times = None;
+        let mut all = Vec::with_capacity(members.len());
+        for &one in members {
+            let listed = &self.channels[one];
+            let of = |problem: Problem| Problem::of(listed.shown(), problem.in_words());
+            let found = self
+                .channel4(one)
+                .ok_or_else(|| of(Problem::whole("not in the file")))?;
+            let signal = file.signal(found).map_err(problem).map_err(of)?;
+            let (values, invalid) = readings(&signal, listed.kind).map_err(of)?;
+            if times.is_none()
+                && let Some(master) = self.master4(self.group_of(one))
+            {
+                let signal = file.signal(master).map_err(problem).map_err(of)?;
+                times = Some(Arc::new(seconds(&signal, master).map_err(of)?));
+            }
+            all.push(whole(listed, values, times.clone(), invalid)?);
+        }
+        Ok(all)
+    }
+
+    fn group4(&self, (data, group): (usize, usize)) -> Option<&falcon_mdf::ChannelGroup> {
+        let Either::Four(file) = &self.file else {
+            return None;
+        };
+        file.data_groups().get(data)?.channel_groups.get(group)
+    }
+
+    fn channel4(&self, channel: usize) -> Option<&falcon_mdf::Channel> {
+        self.group4(self.group_of(channel))?
+            .channels
+            .get(self.at[channel].2)
+    }
+
+    /// The time of a group.
+    fn master4(&self, group: (usize, usize)) -> Option<&falcon_mdf::Channel> {
+        let mut channels = self.group4(group)?.channels.iter();
+        channels.find(|channel| channel.is_master() && channel.sync_type == SyncType::Time)
+    }
+
+    /// Channels of one group, some records at a time; `None` for others, and for channels that are no bytes of a record but are counted.
+    fn pieces4(&self, wanted: &[usize]) -> Result<Option<Pieces<'_>>, Problem> {
+        let (Either::Four(file), Some(&first)) = (&self.file, wanted.first()) else {
+            return Ok(None);
+        };
+        let group = self.group_of(first);
+        let members: Option<Vec<&falcon_mdf::Channel>> =
+            wanted.iter().map(|&one| self.channel4(one)).collect();
+        let (Some(mut members), Some(master)) = (members, self.master4(group)) else {
+            return Ok(None);
+        };
+        members.push(master);
+        let counted = |channel: &&falcon_mdf::Channel| {
+            matches!(
+                channel.channel_type,
+                ChannelType::VirtualData | ChannelType::VirtualMaster
+            )
+        };
+        if members.iter().any(counted) || wanted.iter().any(|&one| self.group_of(one) != group) {
+            return Ok(None);
+        }
+        let chunks = file
+            .signals_chunks(&members, ROWS_A_PIECE)
+            .map_err(problem)?;
+        let listed: Vec<&Channel> = wanted.iter().map(|&one| &self.channels[one]).collect();
+        let piece = move |chunk: Result<Vec<falcon_mdf::Signal>, falcon_mdf::error::Mf4Error>| {
+            let chunk = chunk.map_err(problem)?;
+            let (Some(time), signals) = (chunk.last(), chunk.iter().zip(&listed)) else {
+                return Ok(Vec::new());
+            };
+            let times = Arc::new(seconds(time, master)?);
+            let series = signals.map(|(signal, listed)| {
+                let read = readings(signal, listed.kind);
+                let (values, invalid) =
+                    read.map_err(|problem| Problem::of(listed.shown(), problem.in_words()))?;
+                whole(listed, values, Some(Arc::clone(&times)), invalid)
+            });
+            series.collect()
+        };
+        Ok(Some(Box::new(chunks.map(piece))))
     }
 
     fn read3(&mut self, wanted: &[usize]) -> Result<Vec<Series>, Problem> {
@@ -280,6 +376,33 @@ impl MdfSource {
         }
         Ok(all)
     }
+}
+
+/// A channel's numbers, and which of them are invalid.
+fn readings(
+    signal: &falcon_mdf::Signal,
+    kind: Kind,
+) -> Result<(Vec<f64>, Option<Vec<bool>>), Problem> {
+    let values = if kind == Kind::Enum {
+        signal.raw_values()
+    } else {
+        signal.values()
+    };
+    let invalid = signal
+        .validity()
+        .map(|valid| valid.into_iter().map(|valid| !valid).collect());
+    Ok((numbers(values.map_err(problem)?)?, invalid))
+}
+
+/// A group's times in s.
+fn seconds(signal: &falcon_mdf::Signal, master: &falcon_mdf::Channel) -> Result<Vec<f64>, Problem> {
+    let mut values = numbers(signal.values().map_err(problem)?)?;
+    let unit =
+        crate::units::of(&master.unit).filter(|unit| unit.quantity == crate::units::Quantity::Time);
+    if let Some(unit) = unit.filter(|unit| unit.factor != 1.0) {
+        values.iter_mut().for_each(|value| *value *= unit.factor);
+    }
+    Ok(values)
 }
 
 /// As many readings as time stamps, or a word.
@@ -364,20 +487,16 @@ impl Source for MdfSource {
     }
 
     fn read(&mut self, wanted: &[usize]) -> Result<Vec<Series>, Problem> {
-        if let Some(text) = wanted
-            .iter()
-            .filter_map(|&k| self.channels.get(k))
-            .find(|channel| !channel.kind.is_number())
-        {
-            return Err(Problem::of(
-                text.shown(),
-                format!("{}, not a number", text.kind.word()),
-            ));
-        }
+        self.are_numbers(wanted)?;
         match self.file {
             Either::Three(_) => self.read3(wanted),
             Either::Four(_) => self.read4(wanted),
         }
+    }
+
+    fn pieces(&self, wanted: &[usize]) -> Result<Option<Pieces<'_>>, Problem> {
+        self.are_numbers(wanted)?;
+        self.pieces4(wanted)
     }
 
     fn faults(&self) -> Vec<String> {

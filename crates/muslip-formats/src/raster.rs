@@ -11,7 +11,7 @@ use crate::map::Method;
 /// A step is a gap from so many sample intervals ...
 const GAP_INTERVALS: f64 = 5.0;
 /// ... and from so many seconds.
-const GAP_S: f64 = 0.1;
+pub(crate) const GAP_S: f64 = 0.1;
 /// A channel that much faster than the raster is decimated; below, jitter alone may make it.
 const FASTER_BY: f64 = 1.2;
 /// Edge of the low-pass before decimation, as a share of the raster's rate: 0.5 would alias just at the edge.
@@ -36,26 +36,39 @@ pub fn interval_s(times: &[f64]) -> Option<f64> {
 pub fn rate_hz(times: &[f64]) -> Option<f64> {
     let interval = interval_s(times)?;
     let (first, last) = (times.first()?, times.last()?);
-    let mean = (times.len() - 1) as f64 / (last - first);
+    Some(rate_of(interval, times.len() as f64, last - first))
+}
+
+/// The rate of so many times with a median interval, over a span in s.
+pub(crate) fn rate_of(interval: f64, count: f64, span: f64) -> f64 {
+    let mean = (count - 1.0) / span;
     let even = (mean * interval - 1.0).abs() < 0.01;
-    Some(if even { mean } else { 1.0 / interval })
+    if even { mean } else { 1.0 / interval }
 }
 
 /// Longest step in s that is no gap.
 #[must_use]
 pub fn longest_step_s(times: &[f64]) -> f64 {
-    interval_s(times).map_or(GAP_S, |interval| (GAP_INTERVALS * interval).max(GAP_S)) * (1.0 + 1e-9)
+    longest_of(interval_s(times))
+}
+
+/// The same of a median interval.
+pub(crate) fn longest_of(interval: Option<f64>) -> f64 {
+    interval.map_or(GAP_S, |interval| (GAP_INTERVALS * interval).max(GAP_S)) * (1.0 + 1e-9)
 }
 
 /// What was done to bring a channel onto the raster.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Done {
     /// It has these times itself.
     Kept,
     /// Between its readings, by the map's method.
-    Interpolated,
+    Interpolated(Method),
     /// Low-passed, then read off.
-    Decimated,
+    Decimated {
+        /// Edge of the low-pass in Hz.
+        edge_hz: f64,
+    },
 }
 
 /// A channel's values at the raster's times.
@@ -73,9 +86,10 @@ pub fn onto(raster: &[f64], times: &[f64], values: &[f64], method: Method) -> (V
         _ => None,
     };
     if let (Some(rate), Method::Linear) = (faster, method) {
+        let edge_hz = EDGE * rate;
         return (
-            low_passed(raster, times, values, longest, EDGE * rate),
-            Done::Decimated,
+            low_passed(raster, times, values, longest, edge_hz),
+            Done::Decimated { edge_hz },
         );
     }
     let mut next = 0;
@@ -104,7 +118,7 @@ pub fn onto(raster: &[f64], times: &[f64], values: &[f64], method: Method) -> (V
             }
         }
     };
-    (raster.iter().map(at).collect(), Done::Interpolated)
+    (raster.iter().map(at).collect(), Done::Interpolated(method))
 }
 
 /// Stretches without a gap and without a missing reading.
@@ -215,7 +229,7 @@ mod tests {
     fn values_lie_between_readings_and_nowhere_else() {
         let raster = [-0.5, 0.0, 0.25, 1.0, 1.5, 2.0, 2.5];
         let (linear, done) = onto(&raster, &[0.0, 1.0, 2.0], &[0.0, 10.0, 0.0], Method::Linear);
-        assert_eq!(done, Done::Interpolated);
+        assert_eq!(done, Done::Interpolated(Method::Linear));
         assert!(linear[0].is_nan() && linear[6].is_nan());
         assert_eq!(linear[1..6], [0.0, 2.5, 10.0, 5.0, 0.0]);
         let (hold, _) = onto(&raster, &[0.0, 1.0, 2.0], &[0.0, 10.0, 0.0], Method::Hold);
@@ -251,7 +265,7 @@ mod tests {
             onto(&raster, &times, &values, Method::Linear)
         };
         let (slow, done) = of(10.0);
-        assert_eq!(done, Done::Decimated);
+        assert_eq!(done, Done::Decimated { edge_hz: 40.0 });
         for (time, value) in raster.iter().zip(&slow).skip(20).take(1900) {
             assert!(
                 (value - (2.0 * PI * 10.0 * time).sin()).abs() < 2e-3,

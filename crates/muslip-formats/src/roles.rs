@@ -15,6 +15,8 @@ pub struct Role {
     pub name: &'static str,
     /// What it measures.
     pub quantity: Quantity,
+    /// Whether an estimate cannot do without it.
+    pub required: bool,
     /// Names that mean nothing else, folded as by [`fold`]; they count also as a part of a longer name.
     strong: &'static [&'static str],
     /// Words that mean it where they stand by themselves between separators: symbols of ISO 8855, TYDEX and of practice.
@@ -29,6 +31,7 @@ pub const ROLES: [Role; 7] = [
     Role {
         name: TIME,
         quantity: Quantity::Time,
+        required: true,
         strong: &[
             "timestamp",
             "zeitstempel",
@@ -44,6 +47,7 @@ pub const ROLES: [Role; 7] = [
     Role {
         name: "wheel_speed_rad_s",
         quantity: Quantity::AngularSpeed,
+        required: true,
         strong: &[
             "wheelspeed",
             "wheelspd",
@@ -105,6 +109,7 @@ pub const ROLES: [Role; 7] = [
     Role {
         name: "vehicle_speed_m_s",
         quantity: Quantity::Speed,
+        required: true,
         strong: &[
             "vehiclespeed",
             "vehiclespd",
@@ -156,6 +161,7 @@ pub const ROLES: [Role; 7] = [
     Role {
         name: "drag_force_n",
         quantity: Quantity::Force,
+        required: true,
         strong: &[
             "dragforce",
             "brakeforce",
@@ -189,6 +195,7 @@ pub const ROLES: [Role; 7] = [
     Role {
         name: "normal_force_n",
         quantity: Quantity::Force,
+        required: true,
         strong: &[
             "normalforce",
             "verticalforce",
@@ -225,6 +232,7 @@ pub const ROLES: [Role; 7] = [
     Role {
         name: "brake_torque_nm",
         quantity: Quantity::Torque,
+        required: false,
         strong: &[
             "braketorque",
             "brakingtorque",
@@ -250,6 +258,7 @@ pub const ROLES: [Role; 7] = [
     Role {
         name: "brake_pressure_pa",
         quantity: Quantity::Pressure,
+        required: false,
         strong: &[
             "brakepressure",
             "brakepress",
@@ -295,6 +304,17 @@ pub struct Assigned {
     pub entry: Entry,
 }
 
+/// A column of the contract that no channel became.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Refused {
+    /// The column's header.
+    pub column: &'static str,
+    /// Why, with the candidates and the key of a map that would choose.
+    pub reason: String,
+    /// Whether several channels may be it: then nothing is read of the file before one is chosen.
+    pub ambiguous: bool,
+}
+
 /// What the map, or the guess, made of a file's channels.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Roles {
@@ -303,12 +323,20 @@ pub struct Roles {
     /// The column of time, where the map names it or a guess found one; times of other groups may be others.
     pub time: Option<Assigned>,
     /// Columns of the contract that no channel became, and why.
-    pub refused: Vec<(&'static str, String)>,
+    pub refused: Vec<Refused>,
     /// Whether it is a guess.
     pub guessed: bool,
 }
 
 impl Roles {
+    /// The first column, required or not, that several channels may be. The time is not among them: which one counts is asked by group, where a
+    /// channel has none of its own.
+    #[must_use]
+    pub fn ambiguous(&self) -> Option<&Refused> {
+        let mut refused = self.refused.iter();
+        refused.find(|one| one.ambiguous && one.column != TIME)
+    }
+
     /// The column that a channel became.
     #[must_use]
     pub fn of_channel(&self, channel: usize) -> Option<&str> {
@@ -379,13 +407,14 @@ pub fn by_map(channels: &[Channel], map: &Map) -> Result<Roles, Problem> {
     }
     for role in &ROLES[1..] {
         if !map.channels.contains_key(role.name) {
-            roles.refused.push((
-                role.name,
-                format!(
+            roles.refused.push(Refused {
+                column: role.name,
+                reason: format!(
                     "required column {} is missing: the map has no [channels.{}]",
                     role.name, role.name
                 ),
-            ));
+                ambiguous: false,
+            });
         }
     }
     Ok(roles)
@@ -473,13 +502,18 @@ pub fn guess(channels: &[Channel]) -> Roles {
         match guess_of(channels, role) {
             Ok(assigned) if role.name == TIME => roles.time = Some(assigned),
             Ok(assigned) => roles.assigned.push(assigned),
-            Err(reason) => roles.refused.push((role.name, reason)),
+            Err(refused) => roles.refused.push(refused),
         }
     }
     roles
 }
 
-fn guess_of(channels: &[Channel], role: &'static Role) -> Result<Assigned, String> {
+fn guess_of(channels: &[Channel], role: &'static Role) -> Result<Assigned, Refused> {
+    let refused = |reason: String, ambiguous: bool| Refused {
+        column: role.name,
+        reason,
+        ambiguous,
+    };
     let scored: Vec<(u8, usize)> = channels
         .iter()
         .enumerate()
@@ -501,7 +535,7 @@ fn guess_of(channels: &[Channel], role: &'static Role) -> Result<Assigned, Strin
                         .is_some_and(|unit| unit.quantity == role.quantity)
             })
             .collect();
-        return Err(match (named.as_slice(), by_unit.as_slice()) {
+        let reason = match (named.as_slice(), by_unit.as_slice()) {
             ([], []) => format!(
                 "required column {} is missing: no channel's name or unit says it is one; name it in a map, [channels.{}]",
                 role.name, role.name
@@ -519,7 +553,8 @@ fn guess_of(channels: &[Channel], role: &'static Role) -> Result<Assigned, Strin
                 role.quantity.si(),
                 role.name
             ),
-        });
+        };
+        return Err(refused(reason, false));
     };
     let fitting: Vec<usize> = scored
         .iter()
@@ -541,12 +576,20 @@ fn guess_of(channels: &[Channel], role: &'static Role) -> Result<Assigned, Strin
             channel: *first,
             entry: Entry::named(&channels[*first].name),
         }),
-        several => Err(format!(
-            "column {} may be {}: choose in a map, [channels.{}]",
-            role.name,
-            list(channels, several),
-            role.name
-        )),
+        several => {
+            let left_out = if role.required {
+                ""
+            } else {
+                ", or leave the column out of it"
+            };
+            let reason = format!(
+                "column {} may be {}: choose in a map, [channels.{}]{left_out}",
+                role.name,
+                list(channels, several),
+                role.name
+            );
+            Err(refused(reason, true))
+        }
     }
 }
 
@@ -749,26 +792,38 @@ mod tests {
     fn equals_are_refused_with_their_names() {
         let channels = ["nWheelFL", "nWheelFR"].map(|name| channel(name, "1/min"));
         let roles = guess(&channels);
-        let (_, told) = roles
-            .refused
-            .iter()
-            .find(|(role, _)| *role == "wheel_speed_rad_s")
-            .unwrap();
+        let refused = roles.ambiguous().unwrap();
+        assert_eq!(refused.column, "wheel_speed_rad_s");
         assert!(
-            told.contains("nWheelFL [1/min], nWheelFR [1/min]"),
-            "{told}"
+            refused
+                .reason
+                .contains("nWheelFL [1/min], nWheelFR [1/min]"),
+            "{refused:?}"
         );
+        // One that no estimate needs is no less refused.
+        let channels = ["pBrakeFL", "pBrakeFR"].map(|name| channel(name, "bar"));
+        let roles = guess(&channels);
+        let refused = roles.ambiguous().unwrap();
+        assert_eq!(refused.column, "brake_pressure_pa");
+        assert!(refused.reason.contains("or leave"), "{refused:?}");
+        // A time of each group is no ambiguity.
+        let mut times = [channel("Time", "s"), channel("Time", "s")];
+        times[1].group = "2".to_owned();
+        assert_eq!(guess(&times).ambiguous(), None);
     }
 
     #[test]
     fn a_unit_of_another_quantity_is_no_candidate_but_told() {
         let roles = guess(&[channel("WheelSpeed", "km/h")]);
-        let (_, told) = &roles
+        let told = roles
             .refused
             .iter()
-            .find(|(role, _)| *role == "wheel_speed_rad_s")
+            .find(|refused| refused.column == "wheel_speed_rad_s")
             .unwrap();
-        assert!(told.contains("WheelSpeed [km/h]"), "{told}");
+        assert!(
+            told.reason.contains("WheelSpeed [km/h]") && !told.ambiguous,
+            "{told:?}"
+        );
         assert_eq!(guessed(&[("speed", "km/h"), ("n", "rpm")])[2], "speed");
         // A temperature is none of them.
         assert!(

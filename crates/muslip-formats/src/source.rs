@@ -96,6 +96,9 @@ impl Series {
     }
 }
 
+/// Readings of several channels, some at a time: of each channel as many as of the others.
+pub type Pieces<'a> = Box<dyn Iterator<Item = Result<Vec<Series>, Problem>> + 'a>;
+
 /// A source of channels: what each format is to everything above it.
 pub trait Source: Send {
     /// What start the file gives, in RFC 3339.
@@ -109,6 +112,16 @@ pub trait Source: Send {
     /// # Errors
     /// [`Problem`] where a channel is no number, a block of it is damaged, or a filter of it is not supported.
     fn read(&mut self, wanted: &[usize]) -> Result<Vec<Series>, Problem>;
+
+    /// Reads channels of one length some readings at a time, so that a file of any length fits into memory; `None` where these have to be read
+    /// whole. What is missing at the end is not told here: who goes through them counts.
+    ///
+    /// # Errors
+    /// As [`Source::read`].
+    fn pieces(&self, wanted: &[usize]) -> Result<Option<Pieces<'_>>, Problem> {
+        let _ = wanted;
+        Ok(None)
+    }
 
     /// What of the file was found damaged or left out so far, one line each.
     fn faults(&self) -> Vec<String>;

@@ -7,7 +7,7 @@ use crate::error::{FormatError, Problem};
 use crate::file_bytes::FileBytes;
 use crate::format::Format;
 use crate::guard::guarded;
-use crate::source::{Channel, Series, Source};
+use crate::source::{Channel, Pieces, Series, Source};
 
 /// An open file: its format and its channels.
 pub struct SourceFile {
@@ -101,10 +101,45 @@ impl SourceFile {
         guarded(|| source.read(wanted)).map_err(|problem| problem.in_file(&self.path))
     }
 
+    /// Reads channels of one length some readings at a time; `None` where these have to be read whole.
+    ///
+    /// # Errors
+    /// As [`SourceFile::read`].
+    pub fn pieces(&self, wanted: &[usize]) -> Result<Option<FilePieces<'_>>, FormatError> {
+        let pieces = guarded(|| self.source.pieces(wanted));
+        let pieces = pieces.map_err(|problem| problem.in_file(&self.path))?;
+        Ok(pieces.map(|pieces| FilePieces {
+            pieces,
+            path: &self.path,
+        }))
+    }
+
     /// What of the file was found damaged or left out so far, one line each.
     #[must_use]
     pub fn faults(&self) -> Vec<String> {
         self.source.faults()
+    }
+}
+
+/// Readings of several channels of a file, some at a time.
+pub struct FilePieces<'a> {
+    pieces: Pieces<'a>,
+    path: &'a Path,
+}
+
+impl std::fmt::Debug for FilePieces<'_> {
+    fn fmt(&self, out: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        out.debug_struct("FilePieces").finish_non_exhaustive()
+    }
+}
+
+impl Iterator for FilePieces<'_> {
+    type Item = Result<Vec<Series>, FormatError>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        let piece = guarded(|| self.pieces.next().transpose());
+        let piece = piece.map_err(|problem| problem.in_file(self.path));
+        piece.transpose()
     }
 }
 

@@ -259,6 +259,14 @@ impl TdmsSource {
         let mut first_time = None;
         for run in runs {
             let size = run.size();
+            if run.is_plain() {
+                for chunk in 0..run.chunks {
+                    let start = run.offset + chunk * run.chunk;
+                    let kind = (run.number, run.big);
+                    self.file.numbers(start, run.count, kind, &mut values)?;
+                }
+                continue;
+            }
             // The runs of several chunks at once where they are small, a part of a run where it is large.
             let span = (run.count - 1) * run.stride + size;
             let together = if span > PIECE {
@@ -295,6 +303,14 @@ impl TdmsSource {
 }
 
 impl Run {
+    /// Whether it is numbers one after the other, in pieces worth a fetch of their own.
+    fn is_plain(&self) -> bool {
+        !self.time
+            && self.bit.is_none()
+            && self.stride == self.size()
+            && (self.chunks == 1 || self.count * self.stride > 1 << 14)
+    }
+
     fn size(&self) -> u64 {
         if self.time {
             16

@@ -147,6 +147,16 @@ pub enum InputProblem {
     NoCurve(String),
 }
 
+impl InputProblem {
+    /// A column of the contract that is not there, with the reason where its channel was looked for.
+    pub fn missing(column: &'static str, refused: &[muslip_formats::roles::Refused]) -> Self {
+        match refused.iter().find(|one| one.column == column) {
+            Some(refused) => Self::Channels(refused.reason.clone()),
+            None => Self::MissingColumn(column),
+        }
+    }
+}
+
 impl From<muslip_formats::FormatError> for InputError {
     fn from(error: muslip_formats::FormatError) -> Self {
         let (line, column) = error.line();

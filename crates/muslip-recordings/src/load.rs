@@ -6,9 +6,11 @@ use std::mem::take;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use muslip_diagnose::campaign;
+use muslip_diagnose::campaign::{self, How, Resampled};
 use muslip_diagnose::outcome::Fault;
-use muslip_formats::map::Map;
+use muslip_formats::convert;
+use muslip_formats::map::{Map, Method};
+use muslip_formats::raster::{Done, interval_s};
 use rayon::prelude::*;
 
 use crate::input_error::{InputError, InputProblem};
@@ -17,6 +19,9 @@ use crate::rig_file::RigFile;
 
 /// Rows between two reports of progress.
 const ROWS_A_REPORT: usize = 1 << 14;
+/// A channel whose own interval is longer than the recording's by this factor has fewer readings than the recording has rows; below, jitter
+/// alone may make it.
+const COARSER_BY: f64 = 1.2;
 
 /// The rig as the engine takes it.
 #[must_use]
@@ -115,6 +120,7 @@ fn of_recording(
             what: fault.what.clone(),
         })
         .collect();
+    let resampled = recording.resampled().to_vec();
     let mut rows = recording.rows(required)?;
     let header = rows.header().clone();
     let mut columns: Vec<Vec<f64>> = vec![Vec::new(); header.names().len()];
@@ -126,6 +132,9 @@ fn of_recording(
                     column.shrink_to_fit();
                 }
                 let mut loaded = in_order(&path, &header, columns);
+                let step_s = interval_s(&loaded.run.time_s).unwrap_or(f64::INFINITY);
+                let told = resampled.iter().filter_map(|one| brought(one, step_s));
+                loaded.run.resampled = told.collect();
                 loaded.faults.extend(conversion);
                 return Ok(loaded);
             };
@@ -137,6 +146,22 @@ fn of_recording(
         bytes_read(now - told);
         told = now;
     }
+}
+
+/// What was done to a column, as the engine takes it; nothing where it has as many readings as rows.
+fn brought(one: &convert::Resampled, step_s: f64) -> Option<Resampled> {
+    let coarser = one.interval_s > COARSER_BY * step_s;
+    let how = match one.done {
+        Done::Interpolated(Method::Linear) if coarser => How::Interpolated,
+        Done::Interpolated(Method::Hold) if coarser => How::Held,
+        Done::Decimated { edge_hz } => How::Decimated { edge_hz },
+        Done::Kept | Done::Interpolated(_) => return None,
+    };
+    Some(Resampled {
+        column: one.column.clone(),
+        interval_s: one.interval_s,
+        how,
+    })
 }
 
 /// Hands every column to its place without copying it.
@@ -159,6 +184,7 @@ fn in_order(path: &Path, header: &Header, mut columns: Vec<Vec<f64>>) -> Loaded 
         brake_torque_nm: of(Channel::BrakeTorque),
         brake_pressure_pa: of(Channel::BrakePressure),
         extra,
+        resampled: Vec::new(),
     };
     let (untimed, faults) = mend_time(&mut run);
     Loaded {

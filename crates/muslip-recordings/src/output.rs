@@ -7,8 +7,44 @@
 use std::fs::{self, File};
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
 
 use tempfile::{NamedTempFile, TempDir};
+
+/// Files and folders under temporary names, of all threads.
+static HALF_WRITTEN: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
+
+/// Removes what is half written: for programs that are about to end without leaving their functions, as at an interrupt.
+pub fn remove_half_written() {
+    let mut all = HALF_WRITTEN.lock().unwrap_or_else(PoisonError::into_inner);
+    for path in all.drain(..) {
+        // What cannot be removed stays under a name that says what it is.
+        let _ = if path.is_dir() {
+            fs::remove_dir_all(&path)
+        } else {
+            fs::remove_file(&path)
+        };
+    }
+}
+
+/// A temporary name, for as long as there is something under it.
+#[derive(Debug)]
+struct HalfWritten(PathBuf);
+
+impl HalfWritten {
+    fn new(path: &Path) -> Self {
+        let mut all = HALF_WRITTEN.lock().unwrap_or_else(PoisonError::into_inner);
+        all.push(path.to_owned());
+        Self(path.to_owned())
+    }
+}
+
+impl Drop for HalfWritten {
+    fn drop(&mut self) {
+        let mut all = HALF_WRITTEN.lock().unwrap_or_else(PoisonError::into_inner);
+        all.retain(|path| *path != self.0);
+    }
+}
 
 /// An output that could not be written.
 #[derive(Debug, thiserror::Error)]
@@ -49,6 +85,7 @@ enum Sink {
     Renamed {
         temporary: BufWriter<NamedTempFile>,
         destination: PathBuf,
+        half_written: HalfWritten,
     },
     Direct(BufWriter<File>),
 }
@@ -74,11 +111,10 @@ impl OutputFile {
                     Some(folder) if !folder.as_os_str().is_empty() => folder,
                     _ => Path::new("."),
                 };
+                let temporary = temporary_in(folder).map_err(fail)?;
                 Sink::Renamed {
-                    temporary: BufWriter::with_capacity(
-                        1 << 16,
-                        temporary_in(folder).map_err(fail)?,
-                    ),
+                    half_written: HalfWritten::new(temporary.path()),
+                    temporary: BufWriter::with_capacity(1 << 16, temporary),
                     destination,
                 }
             }
@@ -100,6 +136,7 @@ impl OutputFile {
             Sink::Renamed {
                 temporary,
                 destination,
+                half_written,
             } => {
                 let temporary = temporary
                     .into_inner()
@@ -107,6 +144,7 @@ impl OutputFile {
                 temporary
                     .persist(destination)
                     .map_err(|error| fail(error.error))?;
+                drop(half_written);
             }
             Sink::Direct(mut file) => file.flush().map_err(fail)?,
         }
@@ -174,6 +212,7 @@ pub struct StagedFolder {
     destination: PathBuf,
     /// Inside the destination, so that files are renamed and never copied.
     stage: Option<TempDir>,
+    _half_written: HalfWritten,
     /// Whether the folder was not there before.
     made: bool,
 }
@@ -192,6 +231,7 @@ impl StagedFolder {
             .map_err(|error| OutputError::new(destination, error))?;
         Ok(Self {
             destination: destination.to_owned(),
+            _half_written: HalfWritten::new(stage.path()),
             stage: Some(stage),
             made,
         })
@@ -255,6 +295,23 @@ mod tests {
         write_file(&path, b"new").unwrap();
         assert_eq!(fs::read_to_string(&path).unwrap(), "new");
         assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
+    }
+
+    #[test]
+    fn what_is_half_written_is_known_until_it_is_whole() {
+        let folder = tempfile::tempdir().unwrap();
+        let here = || {
+            let all = HALF_WRITTEN.lock().unwrap();
+            all.iter()
+                .filter(|path| path.starts_with(folder.path()))
+                .count()
+        };
+        let file = OutputFile::create(&folder.path().join("run.csv")).unwrap();
+        let staged = StagedFolder::create(folder.path()).unwrap();
+        assert_eq!(here(), 2);
+        file.commit().unwrap();
+        drop(staged);
+        assert_eq!(here(), 0);
     }
 
     #[test]

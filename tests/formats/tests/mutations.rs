@@ -127,7 +127,7 @@ fn went_through(path: &Path, bytes: &[u8]) -> Result<(), String> {
         Err(error) => return whole(error),
     };
     let guess = roles::guess(source.channels());
-    let _ = listed(&mut source, &guess);
+    let _ = listed(&mut source, &guess, &mut |_| {});
     match convert(&mut source, None) {
         Ok(_) => Ok(()),
         Err(error) => whole(error),

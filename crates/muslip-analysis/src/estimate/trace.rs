@@ -1,9 +1,13 @@
-//! The estimate after every sample, as CSV or JSON.
+//! The estimate after every sample, as CSV, JSON or Parquet.
 
 use std::io::{self, Write};
 use std::path::Path;
 
+use muslip_formats::{Cells, ColumnKind, ParquetTable};
 use serde::Serialize;
+
+/// Rows of a Parquet trace that are written at once.
+const ROWS_AT_ONCE: usize = 1 << 16;
 
 /// One used sample and the estimate after it.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -61,94 +65,172 @@ pub enum TraceFormat {
     Json,
     /// One JSON object a line.
     JsonLines,
+    /// Parquet, one column a quantity.
+    Parquet,
 }
 
 impl TraceFormat {
-    /// The format that a file's ending asks for: `.json`, `.jsonl` or `.ndjson`, else CSV.
+    /// The format that a file's ending asks for: `.json`, `.jsonl` or `.ndjson`, `.parquet`, else CSV.
     pub fn of(path: &Path) -> Self {
         match path.extension().and_then(|ending| ending.to_str()) {
             Some("json") => Self::Json,
             Some("jsonl" | "ndjson") => Self::JsonLines,
+            Some("parquet") => Self::Parquet,
             _ => Self::Csv,
         }
     }
 }
 
-/// Writes a trace row by row.
-#[derive(Debug)]
-pub struct TraceWriter<W: Write> {
-    sink: W,
-    format: TraceFormat,
-    rows: u64,
+impl TraceRow {
+    /// The names of its quantities, in the order of [`TraceRow::values`].
+    const NAMES: [&str; 13] = [
+        "time_s",
+        "slip",
+        "friction",
+        "peak_friction",
+        "critical_slip",
+        "p11",
+        "p12",
+        "p22",
+        "innovation",
+        "noise_variance",
+        "signal_before",
+        "signal_after",
+        "nis",
+    ];
+
+    fn values(&self) -> [f64; 13] {
+        [
+            self.time_s,
+            self.slip,
+            self.friction,
+            self.peak_friction,
+            self.critical_slip,
+            self.p11,
+            self.p12,
+            self.p22,
+            self.innovation,
+            self.noise_variance,
+            self.signal_before,
+            self.signal_after,
+            self.nis,
+        ]
+    }
 }
 
-impl<W: Write> TraceWriter<W> {
+/// Writes a trace row by row.
+#[derive(Debug)]
+pub struct TraceWriter<W: Write + Send>(Inner<W>);
+
+#[derive(Debug)]
+#[allow(clippy::large_enum_variant, reason = "one of it in an estimate")]
+enum Inner<W: Write + Send> {
+    Csv(W),
+    Json {
+        sink: W,
+        rows: u64,
+    },
+    JsonLines(W),
+    Parquet {
+        table: ParquetTable<W>,
+        /// Rows to be written, by column.
+        columns: [Vec<f64>; 13],
+    },
+}
+
+impl<W: Write + Send> TraceWriter<W> {
     /// Starts a trace.
     ///
     /// # Errors
-    /// What `sink` answers.
+    /// What `sink` answers; [`io::ErrorKind::Unsupported`] for Parquet in a build without it.
     pub fn new(mut sink: W, format: TraceFormat) -> io::Result<Self> {
-        match format {
-            TraceFormat::Csv => writeln!(
-                sink,
-                "time_s,slip,friction,peak_friction,critical_slip,p11,p12,p22,innovation,\
-                 noise_variance,signal_before,signal_after,nis"
-            )?,
-            TraceFormat::Json => write!(sink, "[")?,
-            TraceFormat::JsonLines => {}
-        }
-        Ok(Self {
-            sink,
-            format,
-            rows: 0,
-        })
+        Ok(Self(match format {
+            TraceFormat::Csv => {
+                writeln!(sink, "{}", TraceRow::NAMES.join(","))?;
+                Inner::Csv(sink)
+            }
+            TraceFormat::Json => {
+                write!(sink, "[")?;
+                Inner::Json { sink, rows: 0 }
+            }
+            TraceFormat::JsonLines => Inner::JsonLines(sink),
+            TraceFormat::Parquet => {
+                let columns = TraceRow::NAMES.map(|name| (name, ColumnKind::Numbers));
+                Inner::Parquet {
+                    table: ParquetTable::new(sink, &columns)?,
+                    columns: Default::default(),
+                }
+            }
+        }))
     }
 
     /// Ends the trace and gives the sink back.
     ///
     /// # Errors
     /// What the sink answers.
-    pub fn finish(mut self) -> io::Result<W> {
-        if self.format == TraceFormat::Json {
-            self.sink.write_all(b"\n]\n")?;
+    pub fn finish(self) -> io::Result<W> {
+        match self.0 {
+            Inner::Csv(sink) | Inner::JsonLines(sink) => Ok(sink),
+            Inner::Json { mut sink, .. } => {
+                sink.write_all(b"\n]\n")?;
+                Ok(sink)
+            }
+            Inner::Parquet {
+                mut table,
+                mut columns,
+            } => {
+                write_columns(&mut table, &mut columns)?;
+                table.finish()
+            }
         }
-        Ok(self.sink)
     }
 }
 
-impl<W: Write> TraceSink for TraceWriter<W> {
+/// Writes the rows that wait, if any do.
+fn write_columns<W: Write + Send>(
+    table: &mut ParquetTable<W>,
+    columns: &mut [Vec<f64>; 13],
+) -> io::Result<()> {
+    if columns[0].is_empty() {
+        return Ok(());
+    }
+    let cells: Vec<Cells<'_>> = columns.iter().map(|c| Cells::Numbers(c)).collect();
+    table.rows(&cells)?;
+    columns.iter_mut().for_each(Vec::clear);
+    Ok(())
+}
+
+impl<W: Write + Send> TraceSink for TraceWriter<W> {
     /// Writes one row, every number with all its digits.
     fn row(&mut self, row: &TraceRow) -> io::Result<()> {
-        match self.format {
-            TraceFormat::Csv => writeln!(
-                self.sink,
-                "{:?},{:?},{:?},{:?},{:?},{:?},{:?},{:?},{:?},{:?},{:?},{:?},{:?}",
-                row.time_s,
-                row.slip,
-                row.friction,
-                row.peak_friction,
-                row.critical_slip,
-                row.p11,
-                row.p12,
-                row.p22,
-                row.innovation,
-                row.noise_variance,
-                row.signal_before,
-                row.signal_after,
-                row.nis
-            )?,
-            TraceFormat::Json => {
-                let separator: &[u8] = if self.rows == 0 { b"\n" } else { b",\n" };
-                self.sink.write_all(separator)?;
-                serde_json::to_writer(&mut self.sink, row)?;
+        match &mut self.0 {
+            Inner::Csv(sink) => {
+                for (place, value) in row.values().into_iter().enumerate() {
+                    let separator = if place == 0 { "" } else { "," };
+                    write!(sink, "{separator}{value:?}")?;
+                }
+                sink.write_all(b"\n")
             }
-            TraceFormat::JsonLines => {
-                serde_json::to_writer(&mut self.sink, row)?;
-                self.sink.write_all(b"\n")?;
+            Inner::Json { sink, rows } => {
+                let separator: &[u8] = if *rows == 0 { b"\n" } else { b",\n" };
+                *rows += 1;
+                sink.write_all(separator)?;
+                Ok(serde_json::to_writer(sink, row)?)
+            }
+            Inner::JsonLines(sink) => {
+                serde_json::to_writer(&mut *sink, row)?;
+                sink.write_all(b"\n")
+            }
+            Inner::Parquet { table, columns } => {
+                for (column, value) in columns.iter_mut().zip(row.values()) {
+                    column.push(value);
+                }
+                if columns[0].len() >= ROWS_AT_ONCE {
+                    write_columns(table, columns)?;
+                }
+                Ok(())
             }
         }
-        self.rows += 1;
-        Ok(())
     }
 }
 
@@ -163,6 +245,7 @@ mod tests {
             ("t", TraceFormat::Csv),
             ("t.json", TraceFormat::Json),
             ("t.jsonl", TraceFormat::JsonLines),
+            ("t.parquet", TraceFormat::Parquet),
         ] {
             assert_eq!(TraceFormat::of(Path::new(name)), format);
         }

@@ -8,7 +8,7 @@ use muslip_recordings::rig_file::RigFile;
 use serde_json::json;
 
 use super::curve::{CurveFit, FitError, fit_curve, robust_start};
-use crate::measure::{Skipped, Survey, for_each_measurement};
+use crate::measure::{Skipped, Survey, for_each_measurement, median};
 
 /// Iterations that are allowed unless the user says otherwise.
 pub const DEFAULT_MAXIMUM_ITERATIONS: usize = 100;
@@ -45,6 +45,8 @@ pub struct FitResult {
     pub slips: Vec<f64>,
     /// Frictions of the samples used.
     pub frictions: Vec<f64>,
+    /// Smallest, median and largest normal force of the samples used, in N.
+    pub normal_force_n: [f64; 3],
 }
 
 /// Why there is no fit.
@@ -67,7 +69,7 @@ pub fn fit_recordings(
     maximum_iterations: usize,
     progress: &mut dyn FnMut(u64),
 ) -> Result<FitResult, FitJobError> {
-    let (mut slips, mut frictions) = (Vec::new(), Vec::new());
+    let (mut slips, mut frictions, mut loads) = (Vec::new(), Vec::new(), Vec::new());
     let mut runs = Vec::new();
     let mut done = 0;
     for recording in recordings.iter_mut() {
@@ -87,6 +89,7 @@ pub fn fit_recordings(
                 }
                 slips.push(measured.point.slip_ratio);
                 frictions.push(measured.point.friction);
+                loads.push(measured.normal_force_n);
                 Ok(())
             },
         )?;
@@ -109,7 +112,18 @@ pub fn fit_recordings(
         residual_correlation,
         slips,
         frictions,
+        normal_force_n: spread(&mut loads),
     })
+}
+
+/// Smallest, median and largest.
+fn spread(values: &mut [f64]) -> [f64; 3] {
+    let [low, high] = values
+        .iter()
+        .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], &value| {
+            [low.min(value), high.max(value)]
+        });
+    [low, median(values).unwrap_or(f64::NAN), high]
 }
 
 fn no_fit(error: FitError, runs: &[RunFit]) -> InputError {

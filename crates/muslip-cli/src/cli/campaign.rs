@@ -6,6 +6,7 @@ use std::sync::{Mutex, PoisonError};
 
 use clap::Args;
 use muslip_analysis::campaign::{Campaign, Run, page_names};
+use muslip_analysis::records::Record;
 use muslip_recordings::output::{StagedFolder, write_file};
 use muslip_recordings::recording::Recording;
 use muslip_report::campaign::index;
@@ -17,6 +18,7 @@ use super::estimate::{Choices, Job, RigSource};
 use super::failure::Failure;
 use super::mapping::Mapping;
 use super::progress::Progress;
+use super::records::write_records;
 use super::terminal::Terminal;
 
 /// Estimate many recordings of one rig and compare them: one overview page, one report per run.
@@ -41,6 +43,9 @@ pub(super) struct Arguments {
     /// Also write the plots of index.html as image files, into DIR/figures.
     #[arg(long, value_enum)]
     format: Option<FigureFormat>,
+    /// Write the result as Parquet as well, one row a recording: what --json prints.
+    #[arg(long, value_name = "OUT.parquet")]
+    parquet: Option<PathBuf>,
     /// Print one JSON object and nothing else; the files are written as well.
     #[arg(long)]
     json: bool,
@@ -101,8 +106,14 @@ pub(super) fn run(arguments: &Arguments, terminal: &mut Terminal) -> Result<(), 
         let figures = figures.iter().map(|(name, figure)| (name.clone(), figure));
         write_figures(&out.join("figures"), figures, format)?;
     }
+    let json = to_json(&campaign);
+    if let Some(path) = &arguments.parquet {
+        let runs = json["runs"].as_array().into_iter().flatten();
+        let records: Vec<Record> = runs.filter_map(|run| run.as_object().cloned()).collect();
+        write_records(path, &records, &json)?;
+    }
     if arguments.json {
-        return terminal.json(&to_json(&campaign));
+        return terminal.json(&json);
     }
     terminal.verdict(&campaign.verdict(), campaign.is_quiet())?;
     terminal.line("")?;
@@ -120,7 +131,11 @@ pub(super) fn run(arguments: &Arguments, terminal: &mut Terminal) -> Result<(), 
     if campaign.standing_out() > MOST {
         terminal.line(&format!("  and {} more", campaign.standing_out() - MOST))?;
     }
-    terminal.line(&format!("Written: {}", out.join(INDEX).display()))
+    terminal.line(&format!("Written: {}", out.join(INDEX).display()))?;
+    if let Some(path) = &arguments.parquet {
+        terminal.line(&format!("Written: {}", path.display()))?;
+    }
+    Ok(())
 }
 
 fn to_json(campaign: &Campaign) -> serde_json::Value {

@@ -5,12 +5,12 @@ use std::path::PathBuf;
 use clap::Args;
 use muslip_analysis::channels::{Listing, listing};
 use muslip_formats::listing::Listed;
-use muslip_formats::roles;
+use muslip_formats::roles::{Refused, Roles, TIME, role};
 use muslip_recordings::map_file;
 use muslip_recordings::output::write_file;
-use muslip_recordings::recording::Required;
 
 use super::failure::Failure;
+use super::progress::Progress;
 use super::terminal::Terminal;
 
 /// List the channels of a file: group, name, unit, rate, samples, times, invalid readings, and what column each would be.
@@ -37,9 +37,16 @@ pub(super) struct Arguments {
     file: PathBuf,
 }
 
+/// Parts of the bar.
+const PARTS: f64 = 1000.0;
+
 pub(super) fn run(arguments: &Arguments, terminal: &mut Terminal) -> Result<(), Failure> {
     let map = arguments.map.as_deref().map(map_file::read).transpose()?;
-    let listing = listing(&arguments.file, map.as_ref())?;
+    let mut progress = Progress::new("read", PARTS as u64);
+    let listing = listing(&arguments.file, map.as_ref(), &mut |share| {
+        progress.done((share * PARTS) as u64);
+    })?;
+    drop(progress);
     let Listing {
         channels,
         roles,
@@ -48,8 +55,8 @@ pub(super) fn run(arguments: &Arguments, terminal: &mut Terminal) -> Result<(), 
     } = &listing;
     if let Some(path) = &arguments.write_map {
         let mut text = listing.map.to_toml();
-        for (_, reason) in needed(roles).filter(|_| roles.guessed) {
-            text.push_str(&format!("# {reason}\n"));
+        for refused in worth_a_word(roles).filter(|_| roles.guessed) {
+            text.push_str(&format!("# {}\n", refused.reason));
         }
         write_file(path, text.as_bytes())?;
     }
@@ -76,8 +83,8 @@ pub(super) fn run(arguments: &Arguments, terminal: &mut Terminal) -> Result<(), 
         terminal.line(
             "Columns are guessed from names and units; --write-map map.toml saves the guess.",
         )?;
-        for (_, reason) in needed(roles) {
-            terminal.paragraph(reason)?;
+        for refused in worth_a_word(roles) {
+            terminal.paragraph(&refused.reason)?;
         }
     }
     if let Some(path) = &arguments.write_map {
@@ -86,18 +93,13 @@ pub(super) fn run(arguments: &Arguments, terminal: &mut Terminal) -> Result<(), 
     Ok(())
 }
 
-/// The columns that an estimate cannot do without and no channel became.
-fn needed(roles: &roles::Roles) -> impl Iterator<Item = &(&'static str, String)> {
-    let is_needed = |name: &str| {
-        Required::DragIncluded
-            .channels()
-            .skip(1)
-            .any(|channel| channel.name() == name)
+/// The columns that an estimate cannot do without and no channel became, and those that several may be.
+fn worth_a_word(roles: &Roles) -> impl Iterator<Item = &Refused> {
+    let needed = |refused: &&Refused| {
+        refused.column != TIME
+            && (refused.ambiguous || role(refused.column).is_some_and(|role| role.required))
     };
-    roles
-        .refused
-        .iter()
-        .filter(move |(role, _)| is_needed(role))
+    roles.refused.iter().filter(needed)
 }
 
 /// One row a channel, under a header.

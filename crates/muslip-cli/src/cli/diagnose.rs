@@ -4,8 +4,11 @@ use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
 use clap::Args;
+use muslip_analysis::property_file::PropertyFile;
+use muslip_analysis::records::of_diagnosis;
 use muslip_diagnose::outcome::Diagnosis;
 use muslip_recordings::load;
+use muslip_recordings::output::write_file;
 use muslip_report::diagnose::files::{self, WriteError};
 use muslip_report::diagnose::page;
 use muslip_report::diagnose::summary::{WIDEST_LINE, summary};
@@ -13,8 +16,10 @@ use muslip_report::diagnose::views::Views;
 use muslip_report::{FigureFormat, write_figures};
 
 use super::failure::Failure;
+use super::fit::tell_property_file;
 use super::mapping::Mapping;
 use super::progress::Progress;
+use super::records::write_records;
 use super::terminal::Terminal;
 
 /// Find the effects in recordings that the simulation lacks: where, which mechanism, size, confidence.
@@ -38,6 +43,12 @@ pub(super) struct Arguments {
     /// Also write the report's plots as image files, into DIR/figures.
     #[arg(long, value_enum)]
     format: Option<FigureFormat>,
+    /// Also write the law that was found as a tyre property file: longitudinal coefficients of the Magic Formula 5.2, for simulations.
+    #[arg(long, value_name = "OUT.tir")]
+    tir: Option<PathBuf>,
+    /// Write the diagnosis as Parquet as well, one row an entry of its lists.
+    #[arg(long, value_name = "OUT.parquet")]
+    parquet: Option<PathBuf>,
     /// Print diagnosis.json and nothing else.
     #[arg(long)]
     json: bool,
@@ -65,6 +76,22 @@ pub(super) fn run(arguments: &Arguments, terminal: &mut Terminal) -> Result<(), 
         let figures = figures.iter().map(|(name, figure)| (name.clone(), figure));
         write_figures(&out.join("figures"), figures, format)?;
     }
+    if let Some(path) = &arguments.parquet {
+        let whole = serde_json::to_value(&diagnosis)
+            .map_err(|error| Failure::Internal(error.to_string()))?;
+        write_records(path, &of_diagnosis(&whole), &whole)?;
+    }
+    // A law that was not fitted is no failure of the diagnosis: it is said, and nothing is written.
+    let property_file = match &arguments.tir {
+        Some(path) => {
+            let file = PropertyFile::of_model(&diagnosis.repaired);
+            if let Ok(file) = &file {
+                write_file(path, file.text.as_bytes())?;
+            }
+            Some((path, file))
+        }
+        None => None,
+    };
     if arguments.json {
         return terminal.bytes(text.as_bytes());
     }
@@ -74,6 +101,16 @@ pub(super) fn run(arguments: &Arguments, terminal: &mut Terminal) -> Result<(), 
     }
     for line in &summary.lines {
         terminal.line(line)?;
+    }
+    if let Some(path) = &arguments.parquet {
+        terminal.line(&format!("Written: {}", path.display()))?;
+    }
+    match property_file {
+        Some((path, Ok(file))) => tell_property_file(path, &file, terminal)?,
+        Some((path, Err(error))) => {
+            terminal.paragraph(&format!("{} is not written: {error}.", path.display()))?;
+        }
+        None => {}
     }
     Ok(())
 }

@@ -9,6 +9,7 @@ use muslip_analysis::estimate::{
     EstimateError, EstimateOptions, EstimateResult, EstimatorKind, RangeSource, TraceFormat,
     TraceWriter, estimate, range_word,
 };
+use muslip_analysis::records::of_result;
 use muslip_analysis::wording::{
     consistency_sentence, estimate_sentence, model_sentences, noise_sentence,
 };
@@ -22,6 +23,7 @@ use muslip_report::{CurveLabel, FigureFormat, of_estimate, write_figures};
 use super::failure::Failure;
 use super::mapping::Mapping;
 use super::progress::Progress;
+use super::records::write_records;
 use super::terminal::Terminal;
 
 /// The name that stands for standard output.
@@ -55,8 +57,8 @@ pub(super) struct Arguments {
     /// relaxation and tread temperature; other effects are listed and not compensated.
     #[arg(long, value_name = "MODEL.toml")]
     model: Option<PathBuf>,
-    /// Write the estimate after every sample: CSV, or JSON where the name ends in .json or .jsonl; `-`
-    /// prints CSV on standard output instead of the summary.
+    /// Write the estimate after every sample: CSV, or JSON where the name ends in .json or .jsonl, or Parquet
+    /// where it ends in .parquet; `-` prints CSV on standard output instead of the summary.
     #[arg(long, value_name = "TRACE.csv")]
     trace: Option<PathBuf>,
     /// Write a report with plots.
@@ -65,6 +67,9 @@ pub(super) struct Arguments {
     /// Also write the report's plots as image files, into the folder OUT-figures beside it.
     #[arg(long, value_enum, requires = "report")]
     format: Option<FigureFormat>,
+    /// Write the result as Parquet as well, one row: what --json prints.
+    #[arg(long, value_name = "OUT.parquet")]
+    parquet: Option<PathBuf>,
     /// Print one JSON object and nothing else.
     #[arg(long)]
     json: bool,
@@ -162,6 +167,11 @@ pub(super) fn run(arguments: &Arguments, terminal: &mut Terminal) -> Result<(), 
         beside: None,
     };
     let (result, notes) = job.run_noting()?;
+    if let Some(path) = &arguments.parquet {
+        let json = result.to_json_noting(&notes);
+        let recording = arguments.recording.display().to_string();
+        write_records(path, &[of_result(&recording, &json)], &json)?;
+    }
     if trace_is_printed {
         return Ok(());
     }
@@ -181,7 +191,8 @@ pub(super) fn run(arguments: &Arguments, terminal: &mut Terminal) -> Result<(), 
     for note in &notes {
         terminal.line(note)?;
     }
-    for path in [&arguments.trace, &arguments.report].into_iter().flatten() {
+    let written = [&arguments.trace, &arguments.report, &arguments.parquet];
+    for path in written.into_iter().flatten() {
         terminal.line(&format!("Written: {}", path.display()))?;
     }
     Ok(())

@@ -1,17 +1,21 @@
 //! `muslip fit`.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 use muslip::filter::PeakEstimate;
 use muslip_analysis::fit::{DEFAULT_MAXIMUM_ITERATIONS, FitResult, fit_recordings};
+use muslip_analysis::property_file::PropertyFile;
+use muslip_analysis::records::of_result;
 use muslip_analysis::wording::verdict_sentence;
+use muslip_recordings::output::write_file;
 use muslip_recordings::recording::Recording;
 use muslip_recordings::rig_file::RigFile;
 
 use super::failure::Failure;
 use super::mapping::Mapping;
 use super::progress::Progress;
+use super::records::write_records;
 use super::terminal::Terminal;
 
 /// Fit the two-parameter law to one or several recordings at once (Levenberg-Marquardt).
@@ -20,7 +24,8 @@ use super::terminal::Terminal;
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  \
 muslip fit --rig rig.toml run.csv\n  \
-muslip fit --rig rig.toml --json run1.csv run2.csv run3.csv")]
+muslip fit --rig rig.toml --json run1.csv run2.csv run3.csv\n  \
+muslip fit --rig rig.toml --tir tyre.tir run.csv")]
 pub(super) struct Arguments {
     /// Rig file (TOML).
     #[arg(long, value_name = "RIG.toml")]
@@ -30,6 +35,12 @@ pub(super) struct Arguments {
     /// Maximum number of iterations (accepted steps).
     #[arg(long, value_name = "N", default_value_t = DEFAULT_MAXIMUM_ITERATIONS)]
     max_iterations: usize,
+    /// Write the law as a tyre property file: longitudinal coefficients of the Magic Formula 5.2, for simulations.
+    #[arg(long, value_name = "OUT.tir")]
+    tir: Option<PathBuf>,
+    /// Write the result as Parquet as well, one row: what --json prints.
+    #[arg(long, value_name = "OUT.parquet")]
+    parquet: Option<PathBuf>,
     /// Print one JSON object and nothing else.
     #[arg(long)]
     json: bool,
@@ -54,10 +65,50 @@ pub(super) fn run(arguments: &Arguments, terminal: &mut Terminal) -> Result<(), 
         &mut |bytes| progress.done(bytes),
     )?;
     drop(progress);
-    if arguments.json {
-        return terminal.json(&result.to_json());
+    let file = match &arguments.tir {
+        Some(path) => {
+            let file = PropertyFile::of_fit(&result, rig.wheel.radius_m)
+                .map_err(|error| Failure::Usage(format!("{}: {error}", path.display())))?;
+            write_file(path, file.text.as_bytes())?;
+            Some((path, file))
+        }
+        None => None,
+    };
+    let json = result.to_json();
+    if let Some(path) = &arguments.parquet {
+        let names: Vec<String> = arguments
+            .recordings
+            .iter()
+            .map(|recording| recording.display().to_string())
+            .collect();
+        write_records(path, &[of_result(&names.join(", "), &json)], &json)?;
     }
-    tell(&result, terminal)
+    if arguments.json {
+        return terminal.json(&json);
+    }
+    tell(&result, terminal)?;
+    if let Some(path) = &arguments.parquet {
+        terminal.line(&format!("Written: {}", path.display()))?;
+    }
+    if let Some((path, file)) = file {
+        tell_property_file(path, &file, terminal)?;
+    }
+    Ok(())
+}
+
+/// Where the law was written, how well its coefficients hold it, and what they cannot.
+pub(super) fn tell_property_file(
+    path: &Path,
+    file: &PropertyFile,
+    terminal: &mut Terminal,
+) -> Result<(), Failure> {
+    terminal.line("")?;
+    terminal.line(&format!("Written: {}", path.display()))?;
+    terminal.paragraph(&format!("Of the tyre property file: {}.", file.sentence()))?;
+    for left_out in &file.left_out {
+        terminal.paragraph(&format!("It cannot hold: {left_out}."))?;
+    }
+    Ok(())
 }
 
 fn tell(result: &FitResult, terminal: &mut Terminal) -> Result<(), Failure> {

@@ -13,9 +13,11 @@ mod estimate;
 mod explain;
 mod failure;
 mod fit;
+mod interrupt;
 mod mapping;
 mod predict;
 mod progress;
+mod records;
 mod rig;
 mod rig_view;
 mod simulate;
@@ -67,6 +69,10 @@ pub fn main() -> ExitCode {
     };
     // A library that gives up on a damaged file is one line about the file, as everything else is.
     muslip_formats::quiet_panics();
+    // What a rig sent until then is not thrown away.
+    if !matches!(arguments.command, Command::Rig(_)) {
+        interrupt::removes_half_written();
+    }
     let mut terminal = Terminal::new();
     let outcome = match arguments.command {
         Command::Estimate(arguments) => estimate::run(&arguments, &mut terminal),

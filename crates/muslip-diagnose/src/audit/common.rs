@@ -135,7 +135,7 @@ fn shared(rig: &Rig, runs: &[Recording]) -> Option<Memory> {
 pub fn common(rig: &Rig, runs: &[Recording]) -> Option<Finding> {
     if runs
         .iter()
-        .any(|run| run.speed.hold.is_some() || run.wheel.hold.is_some())
+        .any(|run| run.speed.is_coarse() || run.wheel.is_coarse())
     {
         return None;
     }

@@ -44,7 +44,7 @@ fn of_drag(timings: &Timings) -> Option<Finding> {
 #[must_use]
 pub fn filters(timings: &Timings, runs: &[Recording]) -> Vec<Finding> {
     // A hold is a kernel of its own.
-    let held = runs.iter().any(|run| run.speed.hold.is_some());
+    let held = runs.iter().any(|run| run.speed.is_coarse());
     of_vehicle(timings)
         .filter(|_| !held)
         .into_iter()

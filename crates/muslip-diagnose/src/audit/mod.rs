@@ -4,6 +4,7 @@
 //! | --- | --- |
 //! | when each channel tells what happened | [`timing`]: [`vehicle`], [`wheel`], [`law`], all by [`squares`] |
 //! | what is held, what moves in steps | [`hold`], [`steps`], [`simple`] |
+//! | what was measured at other times than the recording's | [`resampled`] |
 //! | narrow lines: hum, ripple | [`mod@hum`], [`mod@line`] |
 //! | what filters a channel passes | [`filter`] |
 //! | what is off at a standstill | [`still`] |
@@ -25,6 +26,7 @@ pub mod law;
 pub mod leak;
 pub mod line;
 pub mod recording;
+pub mod resampled;
 pub mod signal;
 pub mod simple;
 pub mod squares;
@@ -58,11 +60,24 @@ pub struct Audit {
     pub timings: Timings,
     /// Slow noise of the vehicle speed.
     pub vehicle_colour: Option<Colour>,
-    /// Entries of `chain`.
+    /// What the channels themselves show.
     pub findings: Vec<Finding>,
+    /// What the reading of the recordings says of them.
+    pub resampled: Vec<Finding>,
 }
 
 impl Audit {
+    /// Entries of `chain`: of a hold that is known from the reading only what that says.
+    #[must_use]
+    pub fn chain(&self) -> Vec<Finding> {
+        let known = |found: &Finding| {
+            let mut resampled = self.resampled.iter();
+            found.finding == Word::Held && resampled.any(|one| one.channel == found.channel)
+        };
+        let seen = self.findings.iter().filter(|found| !known(found));
+        self.resampled.iter().chain(seen).cloned().collect()
+    }
+
     /// Whether the vehicle speed passes a filter slower than the other channels'.
     #[must_use]
     pub fn vehicle_filtered(&self) -> bool {
@@ -80,7 +95,7 @@ fn of_speeds(
     if let Some(finding) = common::common(rig, recordings) {
         return (Some(finding), None);
     }
-    if recordings.iter().any(|run| run.speed.hold.is_some()) {
+    if recordings.iter().any(|run| run.speed.is_coarse()) {
         return (None, None);
     }
     match colour::of_speed(rig, recordings, timings) {
@@ -121,16 +136,22 @@ fn of_tyre(
     let step = step.max(DRAG_STEP_S);
     let left = fitted.left(recordings, step);
     out.extend(zero.or_else(|| still::zero_of_law(&fitted, &left)));
-    // A speed that errs, a filter, a line: the law shows them as the drag's.
-    let other = [
-        Word::ColouredNoise,
-        Word::Held,
-        Word::Quantised,
-        Word::LowPassed,
-        Word::Hum,
-    ]
-    .into_iter()
-    .any(has);
+    // A speed that errs, a filter, a line: the law shows them as the drag's. So does a channel with fewer readings than rows.
+    let coarse = |run: &Recording| {
+        [&run.wheel, &run.speed, &run.drag, &run.load]
+            .iter()
+            .any(|channel| channel.coarse)
+    };
+    let other = recordings.iter().any(coarse)
+        || [
+            Word::ColouredNoise,
+            Word::Held,
+            Word::Quantised,
+            Word::LowPassed,
+            Word::Hum,
+        ]
+        .into_iter()
+        .any(has);
     if !other && ripple.is_none() {
         out.extend(colour::of_drag(&left, step));
     }
@@ -162,6 +183,7 @@ pub fn audit(rig: &Rig, runs: &[Run]) -> Audit {
         brake_late: timings.brake,
         vehicle_colour,
         findings,
+        resampled: resampled::findings(runs),
         timings,
     }
 }

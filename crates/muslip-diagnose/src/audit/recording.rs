@@ -18,6 +18,16 @@ pub struct Column {
     pub signal: Signal,
     /// How it is held.
     pub hold: Option<Hold>,
+    /// Whether it was measured less often than recorded, and lines drawn or readings held in between.
+    pub coarse: bool,
+}
+
+impl Column {
+    /// Whether it has fewer readings than the recording has rows, by what it shows or by what is known of it.
+    #[must_use]
+    pub fn is_coarse(&self) -> bool {
+        self.coarse || self.hold.is_some()
+    }
 }
 
 /// A run made ready.
@@ -58,6 +68,7 @@ fn channel(time: &[f64], values: &[f64], name: &str) -> Column {
         clean,
         signal,
         hold,
+        coarse: false,
     }
 }
 
@@ -123,6 +134,15 @@ pub fn recording(rig: &Rig, run: &Run) -> Recording {
         brake: brake(rig, run),
         moving: Vec::new(),
     };
+    for one in run.resampled.iter().filter(|one| one.is_coarse()) {
+        match one.column.as_str() {
+            "wheel_speed_rad_s" => out.wheel.coarse = true,
+            "vehicle_speed_m_s" => out.speed.coarse = true,
+            "drag_force_n" => out.drag.coarse = true,
+            "normal_force_n" => out.load.coarse = true,
+            _ => {}
+        }
+    }
     let complete = [&out.wheel, &out.speed, &out.drag, &out.load]
         .iter()
         .all(|c| !c.signal.is_empty());

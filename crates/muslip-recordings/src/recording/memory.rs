@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use muslip_formats::convert;
+use muslip_formats::roles::Refused;
 
 use super::header::{Channel, Header, Required};
 use crate::input_error::{InputError, InputProblem, quoted, shown};
@@ -21,7 +22,8 @@ pub struct Memory {
     pub(super) rows: usize,
     pub(super) notes: Vec<String>,
     pub(super) faults: Vec<convert::Fault>,
-    pub(super) refused: Vec<(&'static str, String)>,
+    pub(super) resampled: Vec<convert::Resampled>,
+    pub(super) refused: Vec<Refused>,
 }
 
 impl fmt::Debug for Memory {
@@ -82,6 +84,7 @@ impl Memory {
             rows,
             notes: Vec::new(),
             faults: Vec::new(),
+            resampled: Vec::new(),
             refused: Vec::new(),
         };
         memory.check_time()?;
@@ -131,6 +134,12 @@ impl Memory {
         &self.faults
     }
 
+    /// Which columns were measured at other times than the recording's.
+    #[must_use]
+    pub fn resampled(&self) -> &[convert::Resampled] {
+        &self.resampled
+    }
+
     /// Bytes of its values.
     pub(super) fn length_bytes(&self) -> u64 {
         (self.rows * self.columns.len() * size_of::<f64>()) as u64
@@ -144,12 +153,7 @@ impl Memory {
         let Some(channel) = missing else {
             return Ok(());
         };
-        let mut refused = self.refused.iter();
-        let refused = refused.find(|(role, _)| *role == channel.name());
-        let problem = match refused {
-            Some((_, reason)) => InputProblem::Channels(reason.clone()),
-            None => InputProblem::MissingColumn(channel.name()),
-        };
+        let problem = InputProblem::missing(channel.name(), &self.refused);
         Err(InputError::whole_file(&self.path, problem))
     }
 

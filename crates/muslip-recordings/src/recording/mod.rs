@@ -17,4 +17,4 @@ pub use header::{Channel, Header, Required};
 pub use memory::{Memory, SharedColumn};
 pub use reader::{Recording, Row, Rows};
 pub use run::Run;
-pub use writer::{RecordingWriter, push_exact};
+pub use writer::{RecordingWriter, push_exact, write_comments};

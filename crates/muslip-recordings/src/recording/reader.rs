@@ -111,6 +111,7 @@ impl Recording {
             faults.clone_from(&converted.faults);
             refused.clone_from(&converted.refused);
         }
+        let resampled = recording.resampled().to_vec();
         let mut rows = recording.rows(Required::DragOptional)?;
         let header = rows.header().clone();
         let mut columns: Vec<Vec<f64>> = vec![Vec::new(); header.names().len()];
@@ -131,6 +132,7 @@ impl Recording {
             rows,
             notes,
             faults,
+            resampled,
             refused,
         })
     }
@@ -159,6 +161,15 @@ impl Recording {
             Source::Text { .. } => &[],
             Source::Table(table) => &table.converted.faults,
             Source::Memory(memory) => memory.faults(),
+        }
+    }
+
+    /// Which columns were measured at other times than the recording's.
+    pub fn resampled(&self) -> &[muslip_formats::convert::Resampled] {
+        match &self.source {
+            Source::Text { .. } => &[],
+            Source::Table(table) => &table.converted.resampled,
+            Source::Memory(memory) => memory.resampled(),
         }
     }
 

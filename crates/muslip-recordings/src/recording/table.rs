@@ -61,12 +61,10 @@ impl Table {
             .channels()
             .find(|&channel| self.header.index(channel).is_none());
         if let Some(channel) = missing {
-            let mut refused = self.converted.refused.iter();
-            let refused = refused.find(|(role, _)| *role == channel.name());
-            return fail(match refused {
-                Some((_, reason)) => InputProblem::Channels(reason.clone()),
-                None => InputProblem::MissingColumn(channel.name()),
-            });
+            return fail(InputProblem::missing(
+                channel.name(),
+                &self.converted.refused,
+            ));
         }
         if self.rows() == 0 {
             return fail(InputProblem::NoUsableSample("no row".to_owned()));

@@ -17,9 +17,7 @@ impl<W: Write> RecordingWriter<W> {
     /// # Errors
     /// What `sink` answers.
     pub fn new(mut sink: W, comments: &[String], columns: &[&str]) -> io::Result<Self> {
-        for comment in comments {
-            writeln!(sink, "# {}", crate::input_error::one_line(comment))?;
-        }
+        write_comments(&mut sink, comments)?;
         writeln!(sink, "{}", columns.join(","))?;
         Ok(Self {
             sink,
@@ -61,6 +59,17 @@ impl<W: Write> RecordingWriter<W> {
     pub fn into_inner(self) -> W {
         self.sink
     }
+}
+
+/// Writes comment lines, wherever in a recording.
+///
+/// # Errors
+/// What the sink answers.
+pub fn write_comments(sink: &mut impl Write, comments: &[String]) -> io::Result<()> {
+    for comment in comments {
+        writeln!(sink, "# {}", crate::input_error::one_line(comment))?;
+    }
+    Ok(())
 }
 
 /// A number in its shortest exact form, without hundreds of zeros where it is large or small; nothing for one that
