@@ -16,6 +16,9 @@ pub const LEAST_EFFECT: f64 = 0.07;
 /// Least t of the gains on unseen runs: about Student's at five percent, one-sided, for as many runs as campaigns have.
 /// On development campaigns between 1 and 1.5 seventeen standing trials were false and one true.
 pub const LEAST_T: f64 = 2.0;
+/// As [`LEAST_T`], of what no measuring chain leaves anything like: of 60 development campaigns through chains that lack
+/// nothing, no name of that kind that predicts the drag gains [`LEAST_GAIN`] at all.
+pub const LEAST_T_NOT_FED: f64 = 1.5;
 /// Least t of a name that all recordings together make clearly likelier than one that stands.
 pub const LEAST_T_OF_LIKELIER: f64 = 1.0;
 /// Where the runs' own differences hide an effect: least gain at the noise that the sensors make plausible, nats. What
@@ -23,6 +26,13 @@ pub const LEAST_T_OF_LIKELIER: f64 = 1.0;
 pub const LEAST_GAIN_AT_SENSORS: f64 = 20.0;
 /// As [`LEAST_GAIN_AT_SENSORS`]: least t of the gains' signed roots, which is about twice a plain t.
 pub const LEAST_T_AT_SENSORS: f64 = 4.0;
+/// As [`LEAST_T_AT_SENSORS`], of what no measuring chain leaves anything like: on those campaigns the largest was 2.2.
+pub const LEAST_T_AT_SENSORS_NOT_FED: f64 = 3.0;
+/// As [`LEAST_GAIN_AT_SENSORS`], of the same where the runs are uneven: on those
+/// campaigns the largest was 69 nats, with a t of 1.
+pub const LARGE_GAIN_AT_SENSORS: f64 = 80.0;
+/// As [`LARGE_GAIN_AT_SENSORS`]: least t of the gains' signed roots.
+pub const LEAST_T_OF_LARGE: f64 = 1.5;
 /// Nats by which fitted noise may be against what it hides: a likelihood never falls by a term, but for how far the search
 /// for the noise has come.
 pub const INDIFFERENT_NATS: f64 = 10.0;

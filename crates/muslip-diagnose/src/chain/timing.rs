@@ -104,9 +104,10 @@ impl Timing {
             .filter(known)
             .map(|late| late.value.abs() + UNKNOWN_STDS * late.std)
             .fold(0.0, f64::max);
+        // A speed that hardly changes tells no lateness, and its own bends no slip.
         let drag_s = [self.wheel, self.vehicle]
             .into_iter()
-            .filter(known)
+            .filter(|late| late.std < VAGUE_S)
             .map(|late| UNKNOWN_STDS * late.std - self.against_drag(late).value)
             .fold(0.0, f64::max);
         Untold { channels_s, drag_s }
@@ -461,6 +462,10 @@ mod tests {
         assert!((left.untold().channels_s - 9e-4).abs() < 1e-9);
         let shortest = taken_off.shortest_of_tyre_s();
         assert!((shortest - (taken_off.drag_s - shortest)).abs() < 1e-12);
+        // Nor does a speed that hardly changes, whose lateness is not told.
+        let mut held = timing(-0.001, 0.0, -0.001);
+        held.vehicle.std = 7e-3;
+        assert!((held.untold().drag_s - 0.0019).abs() < 1e-9);
         // Speeds that are late say nothing of the drag.
         assert!(timing(0.010, 0.030, 0.0).untold().drag_s < 1e-9);
     }

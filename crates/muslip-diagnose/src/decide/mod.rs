@@ -112,9 +112,13 @@ fn next<'a>(data: &Data, trials: &'a [Trial], before: &TakenUp) -> Option<&'a Tr
         let apart = likeliest.weight() - named.weight() > softness(likeliest.weight());
         if apart { likeliest } else { named }
     });
+    // Much more at the sensors' noise, too: what the runs' own differences hide of a name says nothing against it.
+    let much_more = |own: f64, than: f64| own > DEPENDENCE_SHARE * than + DEPENDENCE_NATS;
     let instead = |t: &&Trial| {
         let of_same = t.claim.balance(data) == named.claim.balance(data);
-        of_same && t.weight() > DEPENDENCE_SHARE * named.weight() + DEPENDENCE_NATS
+        of_same
+            && much_more(t.weight(), named.weight())
+            && much_more(t.at_sensors.0, named.at_sensors.0)
     };
     let mut free = standing().filter(|t| t.mechanism().is_none());
     Some(free.find(instead).unwrap_or(named))

@@ -2,11 +2,12 @@
 
 use crate::chain::timing::Untold;
 use crate::constants::{
-    CLEARLY_PREDICTED, DEPENDENCE_WORTH, INDIFFERENT_NATS, LEAST_EFFECT, LEAST_GAIN,
-    LEAST_GAIN_AT_SENSORS, LEAST_GAIN_OF_DEPENDENCE_AT_SENSORS, LEAST_MEMORY_S, LEAST_PREDICTED,
-    LEAST_PREDICTED_BY_DEPENDENCE, LEAST_T, LEAST_T_AT_SENSORS, LEAST_T_OF_DEPENDENCE,
-    LEAST_T_OF_DEPENDENCE_AT_SENSORS, LEAST_T_OF_LIKELIER, LINED_UP_PREDICTED, MOST_AGAINST,
-    PRICE_OF_NAME, PRICE_OF_PARAMETER, REAL_MEMORY_PREDICTED, REAL_MEMORY_T,
+    CLEARLY_PREDICTED, DEPENDENCE_WORTH, INDIFFERENT_NATS, LARGE_GAIN_AT_SENSORS, LEAST_EFFECT,
+    LEAST_GAIN, LEAST_GAIN_AT_SENSORS, LEAST_GAIN_OF_DEPENDENCE_AT_SENSORS, LEAST_MEMORY_S,
+    LEAST_PREDICTED, LEAST_PREDICTED_BY_DEPENDENCE, LEAST_T, LEAST_T_AT_SENSORS,
+    LEAST_T_AT_SENSORS_NOT_FED, LEAST_T_NOT_FED, LEAST_T_OF_DEPENDENCE,
+    LEAST_T_OF_DEPENDENCE_AT_SENSORS, LEAST_T_OF_LARGE, LEAST_T_OF_LIKELIER, LINED_UP_PREDICTED,
+    MOST_AGAINST, PRICE_OF_NAME, PRICE_OF_PARAMETER, REAL_MEMORY_PREDICTED, REAL_MEMORY_T,
 };
 use crate::data::Data;
 use crate::innovations::dependence::Dependence;
@@ -77,6 +78,8 @@ pub struct Trial {
     pub first: bool,
     /// Whether its parameters are the mechanism's own, and not at a limit where its form is another's.
     pub own: bool,
+    /// Whether a measuring chain leaves what looks like it.
+    pub fed_by_chain: bool,
     /// Whether it is a memory: what was before counts.
     pub remembers: bool,
     /// Whether its memory is longer than what the chain's own timing was off by.
@@ -242,6 +245,8 @@ impl<'a> Before<'a> {
             first: !named || at_sensors.0 > self.taken_up,
             at_sensors,
             own,
+            fed_by_chain: term
+                .is_some_and(|(_, entry, _)| data.catalogue.get(entry).fed_by_chain()),
             remembers: memory_s.is_some(),
             outlasts_chain: memory_s.is_none_or(|(memory, least)| memory > least.max(chain_s)),
             predicts,
@@ -350,7 +355,13 @@ fn seen_at_sensors(trial: &Trial) -> bool {
             && trial.gain > 0.0
             && trial.predicts.is_finite()
             && trial.predicts > LINED_UP_PREDICTED;
-        return sum > LEAST_GAIN_AT_SENSORS && (t > LEAST_T_AT_SENSORS || lined_up);
+        let alike = if trial.fed_by_chain {
+            t > LEAST_T_AT_SENSORS
+        } else {
+            let large = sum > LARGE_GAIN_AT_SENSORS && t > LEAST_T_OF_LARGE;
+            t > LEAST_T_AT_SENSORS_NOT_FED || large
+        };
+        return sum > LEAST_GAIN_AT_SENSORS && (alike || lined_up);
     }
     trial.predicts > LEAST_PREDICTED_BY_DEPENDENCE && dependence_at_sensors(trial)
 }
@@ -372,7 +383,14 @@ pub fn left_open(trial: &Trial) -> bool {
 fn seen_on_unseen_runs(trial: &Trial) -> bool {
     let (mean, t) = trial.unseen;
     match trial.claim {
-        Claim::Mechanism(..) => mean > 0.0 && (t >= LEAST_T || clear_where_it_is(trial)),
+        Claim::Mechanism(..) => {
+            let least = if trial.fed_by_chain {
+                LEAST_T
+            } else {
+                LEAST_T_NOT_FED
+            };
+            mean > 0.0 && (t >= least || clear_where_it_is(trial))
+        }
         // What says nothing of what it is has to be seen at the sensors' noise as well: fitted noise may have left it.
         Claim::Dependence(_) => {
             let at_sensors = trial.at_sensors.1 > LEAST_T_OF_DEPENDENCE_AT_SENSORS;

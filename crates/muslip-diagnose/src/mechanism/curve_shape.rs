@@ -28,6 +28,7 @@ impl Describe for CurveShape {
         };
         Facts {
             form,
+            fed_by_chain: true,
             ..Facts::of(
                 Id::CurveShape,
                 Stage::Law,

@@ -1,6 +1,6 @@
 //! What a mechanism says of itself and what it does.
 
-use super::guide::Guide;
+use super::guide::{Guide, Memory};
 use super::id::Id;
 use super::state::{Law, State};
 use crate::balance::Balance;
@@ -168,6 +168,9 @@ pub struct Facts {
     pub amplitude: Option<usize>,
     /// Whether it is rare beside what recordings hardly tell it from.
     pub rare: bool,
+    /// Whether a measuring chain leaves what looks like it: kernels that differ, slip's noise that flattens the curve, the
+    /// pitch of a ring.
+    pub fed_by_chain: bool,
 }
 
 impl Facts {
@@ -187,6 +190,7 @@ impl Facts {
             drawn_over: Against::Time,
             amplitude: Some(0),
             rare: false,
+            fed_by_chain: false,
         }
     }
 }
@@ -229,6 +233,11 @@ pub trait Describe: Send + Sync {
     /// How long it remembers with these parameters, in s, where it has a memory: one that the measuring chain has, too.
     fn memory_s(&self, _parameters: &[f64], _context: &Context) -> Option<f64> {
         None
+    }
+    /// Whether a measuring chain leaves what looks like it: its descriptor says so, or it remembers no longer than a chain
+    /// does.
+    fn fed_by_chain(&self) -> bool {
+        self.facts().fed_by_chain || self.guide().memory == Memory::Kernel
     }
     /// Whether these parameters are its own, and not at a limit where its form is another's.
     fn owns(&self, _parameters: &[f64]) -> bool {

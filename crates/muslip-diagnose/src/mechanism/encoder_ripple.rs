@@ -17,6 +17,7 @@ impl Describe for EncoderRipple {
         Facts {
             form: self.form.as_str(),
             through_force: false,
+            fed_by_chain: true,
             channel: "wheel_speed_rad_s",
             ..Facts::of(
                 Id::EncoderRipple,

@@ -7,11 +7,14 @@ pub struct InertialReaction;
 
 impl Describe for InertialReaction {
     fn facts(&self) -> Facts {
-        Facts::of(
-            Id::InertialReaction,
-            Stage::Reading,
-            "reading = drag + share * d(omega)/dt",
-        )
+        Facts {
+            fed_by_chain: true,
+            ..Facts::of(
+                Id::InertialReaction,
+                Stage::Reading,
+                "reading = drag + share * d(omega)/dt",
+            )
+        }
     }
     fn parameters(&self, context: &Context) -> Vec<Parameter> {
         // A wheel inertia in the wrong place would give inertia/radius.

@@ -46,6 +46,7 @@ impl Describe for RunOut {
         Facts {
             form,
             rare: self.of == Of::Radius,
+            fed_by_chain: true,
             ..Facts::of(Id::RunOut, stage, equation)
         }
     }

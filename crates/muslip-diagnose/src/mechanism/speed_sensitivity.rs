@@ -64,6 +64,8 @@ impl Describe for SpeedSensitivity {
         };
         Facts {
             form,
+            // By sliding speed friction falls where slip is small, as slip's noise makes it.
+            fed_by_chain: !matches!(self.form, Form::VehicleLinear | Form::VehicleExponential),
             ..Facts::of(Id::SpeedSensitivity, Stage::Friction, equation)
         }
     }
