@@ -26,7 +26,8 @@ pub const LEAST_T_OF_LIKELIER: f64 = 1.0;
 pub const LEAST_GAIN_AT_SENSORS: f64 = 20.0;
 /// As [`LEAST_GAIN_AT_SENSORS`]: least t of the gains' signed roots, which is about twice a plain t.
 pub const LEAST_T_AT_SENSORS: f64 = 4.0;
-/// As [`LEAST_T_AT_SENSORS`], of what no measuring chain leaves anything like: on those campaigns the largest was 2.2.
+/// As [`LEAST_T_AT_SENSORS`], of what no measuring chain leaves anything like and fitted noise lets gain:
+/// on those campaigns the largest was 2.2.
 pub const LEAST_T_AT_SENSORS_NOT_FED: f64 = 3.0;
 /// As [`LEAST_GAIN_AT_SENSORS`], of the same where the runs are uneven: on those
 /// campaigns the largest was 69 nats, with a t of 1.

@@ -355,12 +355,9 @@ fn seen_at_sensors(trial: &Trial) -> bool {
             && trial.gain > 0.0
             && trial.predicts.is_finite()
             && trial.predicts > LINED_UP_PREDICTED;
-        let alike = if trial.fed_by_chain {
-            t > LEAST_T_AT_SENSORS
-        } else {
-            let large = sum > LARGE_GAIN_AT_SENSORS && t > LEAST_T_OF_LARGE;
-            t > LEAST_T_AT_SENSORS_NOT_FED || large
-        };
+        let large = sum > LARGE_GAIN_AT_SENSORS && t > LEAST_T_OF_LARGE;
+        let plain = trial.gain > 0.0 && t > LEAST_T_AT_SENSORS_NOT_FED;
+        let alike = t > LEAST_T_AT_SENSORS || !trial.fed_by_chain && (large || plain);
         return sum > LEAST_GAIN_AT_SENSORS && (alike || lined_up);
     }
     trial.predicts > LEAST_PREDICTED_BY_DEPENDENCE && dependence_at_sensors(trial)
