@@ -4,7 +4,7 @@ use std::io::Write as _;
 use std::path::Path;
 use std::process::{Command, Stdio};
 
-use crate::common::{HEADER, Scratch, words};
+use crate::common::{HEADER, RIG, Scratch, words};
 
 /// The demo's recording as a bench would have made it: MDF 4, packed, km/h, 1/min, kN, the load at a quarter of the rate.
 const BENCH: &str = concat!(
@@ -97,7 +97,7 @@ fn channels_lists_and_writes_a_map_that_finds_them_again() {
     ]);
     assert_eq!(guessed["peak_friction"], mapped["peak_friction"]);
     // The same tables in a rig file.
-    let rig = format!("{}\n{}", crate::common::RIG, scratch.read("map.toml"));
+    let rig = format!("{}\n{}", RIG, scratch.read("map.toml"));
     scratch.write("rig.toml", rig);
     let from_rig = scratch.json(&["estimate", "--rig", "rig.toml", "--json", BENCH]);
     assert_eq!(from_rig["peak_friction"], mapped["peak_friction"]);
@@ -166,7 +166,7 @@ fn what_cannot_be_told_is_one_line_with_the_candidates() {
 
 #[test]
 fn a_diagnosis_knows_what_was_measured_less_often_than_it_is_recorded() {
-    let scratch = Scratch::with_rig(common::RIG);
+    let scratch = Scratch::with_rig(RIG);
     // The load of the bench's file stands at a quarter of the other channels' rate.
     scratch.output(
         &words("channels --write-map map.toml")
@@ -216,7 +216,7 @@ fn a_diagnosis_knows_what_was_measured_less_often_than_it_is_recorded() {
 
 #[test]
 fn the_fitted_law_is_a_property_file_that_another_tyre_library_reads() {
-    let scratch = Scratch::with_rig(common::RIG);
+    let scratch = Scratch::with_rig(RIG);
     scratch.write("lauf.csv", german());
     let text = scratch.output(&words("fit --rig rig.toml --tir tyre.tir lauf.csv"));
     assert!(text.contains("hold the law exactly"), "{text}");
@@ -275,7 +275,7 @@ fn the_fitted_law_is_a_property_file_that_another_tyre_library_reads() {
 
 #[test]
 fn results_are_tables_beside_their_json() {
-    let scratch = Scratch::with_rig(common::RIG);
+    let scratch = Scratch::with_rig(RIG);
     scratch.write("lauf.csv", german());
     let json = scratch.json(&words(
         "estimate --rig rig.toml --parquet estimate.parquet --trace trace.parquet --json lauf.csv",
