@@ -2,7 +2,7 @@
 
 use core::sync::atomic::{AtomicU32, Ordering};
 
-use crate::board::{Chip, This};
+use crate::chip::{Chip, This};
 
 /// Core cycles, or instructions in the emulator; wraps.
 #[inline]

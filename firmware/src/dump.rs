@@ -2,7 +2,7 @@
 
 use core::sync::atomic::{AtomicBool, Ordering};
 
-use crate::board::{Chip, This};
+use crate::chip::{Chip, This};
 
 /// Set by whoever dumps the brake behind the main loop's back, until the main loop dumps it itself.
 static DUMPED: AtomicBool = AtomicBool::new(false);

@@ -16,7 +16,7 @@ use cortex_m::peripheral::SCB;
 use cortex_m_rt::exception;
 use muslip_record::{End, PostMortem, State};
 
-use crate::board::{Chip, This};
+use crate::chip::{Chip, This};
 use crate::dump::dump;
 use crate::post_mortem::{WORDS, packed, state_of, unpacked};
 use crate::stack::GUARD_BYTES;

@@ -49,6 +49,8 @@ pub mod board;
 #[cfg(target_os = "none")]
 mod cell;
 #[cfg(target_os = "none")]
+pub mod chip;
+#[cfg(target_os = "none")]
 mod counter;
 #[cfg(target_os = "none")]
 mod dump;

@@ -9,8 +9,8 @@ use core::sync::atomic::{AtomicU32, Ordering};
 use embedded_io::{ErrorType, Read, ReadReady, Write, WriteReady};
 use heapless::spsc::Queue;
 
-use crate::board::{Chip, This};
 use crate::cell::InterruptCell;
+use crate::chip::{Chip, This, Uart};
 use crate::counter::{Interrupter, Most, cycles, keep};
 use crate::queue::{self, Sender, Taker};
 use crate::totals::add;
@@ -19,21 +19,6 @@ use crate::totals::add;
 const RECEIVE_BYTES: usize = 512;
 /// Telemetry that may wait.
 const TRANSMIT_BYTES: usize = 2048;
-
-/// A UART, as this interrupt uses it.
-pub trait Uart {
-    /// What was received; whether a byte was lost, and the byte. None where nothing was.
-    fn take(&mut self) -> Option<(bool, Option<u8>)>;
-
-    /// Whether it takes a byte to send.
-    fn is_ready(&mut self) -> bool;
-
-    /// Sends a byte.
-    fn send(&mut self, byte: u8);
-
-    /// Whether it is to ask for more.
-    fn ask(&mut self, more: bool);
-}
 
 /// Bytes received on the link so far.
 static RECEIVED: AtomicU32 = AtomicU32::new(0);

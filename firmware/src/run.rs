@@ -10,8 +10,9 @@ use muslip_control::controller::{Controller, Resources};
 use muslip_control::emulation::Delays;
 use muslip_record::State;
 
-use crate::board::{Chip, Started, This, ThisBoard};
+use crate::board::Started;
 use crate::cell::InterruptCell;
+use crate::chip::{Chip, This, ThisBoard, Took};
 use crate::counter::{Interrupter, Most, Stopwatch, cycles, keep};
 use crate::link::{self, LinkEnd};
 use crate::queue::{self, Sender, Taker};
@@ -100,16 +101,6 @@ pub fn run(started: Started) -> ! {
     loop {
         cortex_m::asm::nop();
     }
-}
-
-/// What a sample's work took, in cycles.
-pub struct Took {
-    /// The sampling interrupt.
-    pub interrupt: u32,
-    /// The control step.
-    pub control: u32,
-    /// The step and the link's work.
-    pub step: u32,
 }
 
 struct Loop {

@@ -35,6 +35,7 @@ use muslip_record::{Fault, Parameters};
 use crate::board::{BridgeQuality, RawSample};
 use crate::conversion::Converted;
 use crate::encoder::Speed;
+pub use crate::fault_set::FaultSet;
 use crate::number::nearest;
 use crate::pressure::BrakeLine;
 use crate::rates::Rates;
@@ -68,39 +69,6 @@ const SPEED_NOISE_RAD_S: f32 = 5.0;
 const VEHICLE_CHANGE_M_S2: f32 = 30.0;
 /// Backward speed that is still noise, in rad/s.
 const BACKWARD_RAD_S: f32 = 1.0;
-
-/// A set of faults.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct FaultSet(u32);
-
-impl FaultSet {
-    /// Adds a fault where a condition holds.
-    pub fn add_if(&mut self, holds: bool, fault: Fault) {
-        if holds {
-            self.0 |= 1 << fault as u8;
-        }
-    }
-
-    /// Takes a fault out.
-    pub fn without(self, fault: Fault) -> Self {
-        Self(self.0 & !(1 << fault as u8))
-    }
-
-    /// Whether a fault is in it.
-    pub fn contains(self, fault: Fault) -> bool {
-        self.0 & (1 << fault as u8) != 0
-    }
-
-    /// The fault that is named first.
-    pub fn first(self) -> Option<Fault> {
-        Fault::ALL.into_iter().find(|&fault| self.contains(fault))
-    }
-
-    /// One bit for each fault.
-    pub fn bits(self) -> u32 {
-        self.0
-    }
-}
 
 /// What the controller knows beside the sample.
 #[derive(Debug, Clone, Copy, Default)]

@@ -38,6 +38,7 @@ pub mod conversion;
 pub mod emulation;
 pub mod encoder;
 pub mod estimation;
+mod fault_set;
 pub mod interlock;
 pub mod link;
 mod number;

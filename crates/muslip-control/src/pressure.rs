@@ -8,7 +8,7 @@
 
 use muslip_record::{Fault, PressureParameters};
 
-use crate::interlock::FaultSet;
+use crate::fault_set::FaultSet;
 use crate::rates::Rates;
 
 /// Share of full pressure by which a reading may be off the band.

@@ -265,7 +265,11 @@ mod tests {
             onto(&raster, &times, &values, Method::Linear)
         };
         let (slow, done) = of(10.0);
-        assert_eq!(done, Done::Decimated { edge_hz: 40.0 });
+        let edge = |done: &Done| match done {
+            Done::Decimated { edge_hz } => *edge_hz,
+            _ => f64::NAN,
+        };
+        assert!((edge(&done) - 40.0).abs() < 1e-9, "{done:?}");
         for (time, value) in raster.iter().zip(&slow).skip(20).take(1900) {
             assert!(
                 (value - (2.0 * PI * 10.0 * time).sin()).abs() < 2e-3,

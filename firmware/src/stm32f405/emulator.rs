@@ -14,9 +14,9 @@ use super::settings::CYCLES_PER_SAMPLE;
 use super::uart;
 use crate::bits::{low_u8, low_u16};
 use crate::cell::InterruptCell;
+use crate::chip::Took;
 use crate::counter::cycles;
 use crate::dump::dump;
-use crate::run::Took;
 use crate::{link, totals};
 
 /// True once the emulated board is in use.

@@ -7,7 +7,8 @@ use stm32f4::stm32f405::{Interrupt, NVIC, RCC, USART1, USART2, interrupt};
 
 use super::settings::{APB1_HZ, APB2_HZ, HSI_HZ, LOG_BAUD};
 use crate::bits::low_u8;
-use crate::link::{self, LinkEnd, Uart};
+use crate::chip::Uart;
+use crate::link::{self, LinkEnd};
 use crate::stm32::baud_divisor;
 
 /// Bits of a USART's SR and CR1.

@@ -63,7 +63,7 @@ pub fn log(byte: impl FnOnce() -> Option<u8>) -> bool {
 /// USART2, as its interrupt uses it.
 pub struct Uart;
 
-impl link::Uart for Uart {
+impl crate::chip::Uart for Uart {
     fn take(&mut self) -> Option<(bool, Option<u8>)> {
         let status = Bus.read(USART2 + ISR);
         if status & (RXFNE | ORE) == 0 {

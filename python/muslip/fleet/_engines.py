@@ -67,7 +67,7 @@ def spark(parts: list[Part], plan: Plan, told: Told, session: Any = None) -> Non
     is_own = session is None and SparkSession.getActiveSession() is None
     session = session or SparkSession.builder.appName("muslip fleet").getOrCreate()
     # These functions travel themselves; what they call is looked up where they run, in the archive that was sent along.
-    cloudpickle.register_pickle_by_value(_spark)  # type: ignore[no-untyped-call]
+    cloudpickle.register_pickle_by_value(_spark)
     packed = pickle.dumps(plan)
     frame = session.createDataFrame([(index, pickle.dumps(part)) for index, part in enumerate(parts)], _spark.ASKED)
     try:
