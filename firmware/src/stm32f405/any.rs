@@ -4,8 +4,8 @@ use muslip_control::board::{Actuators, Board, NotStored, RawSample, Sensors};
 use muslip_control::brake::BrakeOutput;
 use muslip_record::Parameters;
 
+use super::chip::Stm32f405;
 use super::emulator::{EmulatedActuators, EmulatedSensors};
-use super::start::Stm32f405;
 use crate::stm32::rig::{RigActuators, RigSensors};
 
 /// The board, whichever it is.

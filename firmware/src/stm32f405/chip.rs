@@ -4,12 +4,12 @@
 //! reviewed against RM0090 (sections are named at each place) and has never run on silicon.
 
 use muslip_control::board::Sensors;
+use muslip_control::rates::Rates;
 use muslip_control::store::Loaded;
 use stm32f4::stm32f405::Peripherals;
 
 use super::flash::ParameterFlash;
 use super::settings::{CORE_HZ, RATES};
-use super::start::Stm32f405;
 use super::{clock, table};
 use crate::bits::low_u16;
 use crate::counter::cycles;
@@ -17,9 +17,11 @@ use crate::registers::{Registers, set_up};
 use crate::stm32::bus::Bus;
 use crate::stm32::rig::{self, Rig, RigSensors, Tables};
 use crate::stm32::wait_for;
-use muslip_control::rates::Rates;
 
 pub use super::clock::runs_at_full_clock;
+
+/// This chip.
+pub struct Stm32f405;
 
 /// What start-up found.
 pub struct Up {

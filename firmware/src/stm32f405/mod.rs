@@ -25,4 +25,6 @@ mod start;
 mod uart;
 
 #[cfg(target_os = "none")]
-pub use start::{Stm32f405, start};
+pub use chip::Stm32f405;
+#[cfg(target_os = "none")]
+pub use start::start;

@@ -1,4 +1,4 @@
-//! Which board this is, and its start-up.
+//! Which board this is, its start-up, and what the main loop needs of it.
 
 use cortex_m::peripheral::scb::SystemHandler;
 use cortex_m::peripheral::{NVIC, SCB};
@@ -8,11 +8,11 @@ use muslip_record::{Origin, Parameters};
 use stm32f4::stm32f405::{Interrupt, Peripherals};
 
 use super::any::{AnyActuators, AnyBoard, AnySensors};
+use super::chip::Stm32f405;
 use super::settings::{CORE_HZ, CYCLES_PER_SAMPLE, HSI_HZ, RATES};
 use super::{chip, emulator, table, uart};
 use crate::board::{LINK_PRIORITY, SAMPLING_PRIORITY, Started, origin, start_timer};
-use crate::chip::Chip;
-use crate::chip::Took;
+use crate::chip::{Chip, Took};
 use crate::fault;
 use crate::registers::first_wrong;
 use crate::stm32::bus::Bus;
@@ -81,9 +81,6 @@ pub fn start() -> Started {
     );
     Started::new(board, &parameters, identity, link)
 }
-
-/// This chip.
-pub struct Stm32f405;
 
 impl Chip for Stm32f405 {
     type Board = AnyBoard;
