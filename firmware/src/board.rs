@@ -2,6 +2,8 @@
 
 use core::sync::atomic::{Ordering, compiler_fence};
 
+use cortex_m::interrupt::InterruptNumber;
+use cortex_m::peripheral::scb::SystemHandler;
 use muslip_control::controller::{Controller, Identity};
 use muslip_control::store::Loaded;
 use muslip_record::{Origin, Parameters};
@@ -12,9 +14,9 @@ use crate::link::LinkEnd;
 
 /// Priorities of the interrupts, in the upper four bits of their registers: 0 goes first.
 /// 0 is the memory fault's: an overflow of the stack must be one in every interrupt.
-pub const LINK_PRIORITY: u8 = 1;
+const LINK_PRIORITY: u8 = 1;
 /// Of sampling.
-pub const SAMPLING_PRIORITY: u8 = 2;
+const SAMPLING_PRIORITY: u8 = 2;
 
 /// Does something with sampling held off, and the link not.
 pub fn without_sampling<T>(work: impl FnOnce() -> T) -> T {
@@ -89,6 +91,22 @@ impl Started {
             controller,
             link,
         }
+    }
+}
+
+/// Sets the priorities of the host link's interrupt and of sampling: the link goes first, for sampling takes longer than
+/// its next byte. docs/design/0013-silicon.md.
+pub fn set_priorities(link: impl InterruptNumber) {
+    #[allow(
+        unsafe_code,
+        reason = "takes the core's peripherals and sets priorities"
+    )]
+    // SAFETY: called once at start-up; nobody else has them, and nothing relies on another order.
+    unsafe {
+        let mut core = cortex_m::Peripherals::steal();
+        core.NVIC.set_priority(link, LINK_PRIORITY << 4);
+        core.SCB
+            .set_priority(SystemHandler::SysTick, SAMPLING_PRIORITY << 4);
     }
 }
 

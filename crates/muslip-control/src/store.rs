@@ -29,6 +29,9 @@ const HEADER_BYTES: usize = 16;
 const CRC_BYTES: usize = 4;
 const PAYLOAD_BYTES: usize = SLOT_BYTES - HEADER_BYTES - CRC_BYTES;
 
+/// Slots that a save tries: one that a cut left looking blank may refuse to be written.
+const SLOTS_TRIED: usize = 3;
+
 static CRC: Crc<u32, Table<1>> = Crc::<u32, Table<1>>::new(&CRC_32_ISO_HDLC);
 
 /// Why parameters could not be saved or loaded.
@@ -188,21 +191,35 @@ impl<F: NorFlash> Store<F> {
             .map_or(1, |newest| newest.sequence.wrapping_add(1));
         fill(&mut slot, sequence, parameters).ok_or(StoreError::TooLong)?;
 
-        let sector = newest
+        let mut sector = newest
             .as_ref()
             .map_or(0, |newest| newest.address / Self::sector_bytes());
-        let address = match self.blank_slot(sector)? {
-            Some(address) => address,
-            None => {
-                // Full: the other sector holds nothing newer.
-                let other = 1 - sector.min(1);
-                let start = other * Self::sector_bytes();
-                self.flash
-                    .erase(start, start + Self::sector_bytes())
-                    .map_err(StoreError::Flash)?;
-                start
+        let mut from = sector * Self::sector_bytes();
+        let mut refused = StoreError::NotWritten;
+        for _ in 0..SLOTS_TRIED {
+            let address = match self.blank_slot(sector, from)? {
+                Some(address) => address,
+                None => {
+                    // Full: the other sector holds nothing newer.
+                    sector = 1 - sector.min(1);
+                    let start = sector * Self::sector_bytes();
+                    self.flash
+                        .erase(start, start + Self::sector_bytes())
+                        .map_err(StoreError::Flash)?;
+                    start
+                }
+            };
+            match self.write(address, &slot) {
+                Ok(()) => return Ok(()),
+                Err(error) => refused = error,
             }
-        };
+            from = address + const { address_of(SLOT_BYTES) };
+        }
+        Err(refused)
+    }
+
+    /// Writes a slot, its last word last, and reads it back.
+    fn write(&mut self, address: u32, slot: &[u8; SLOT_BYTES]) -> Result<(), StoreError<F::Error>> {
         let (body, last) = slot
             .split_at_checked(SLOT_BYTES - Self::LAST_BYTES)
             .ok_or(StoreError::TooLong)?;
@@ -213,7 +230,7 @@ impl<F: NorFlash> Store<F> {
                 last,
             )
             .map_err(StoreError::Flash)?;
-        if self.slot(address)? == slot {
+        if self.slot(address)? == *slot {
             Ok(())
         } else {
             Err(StoreError::NotWritten)
@@ -251,10 +268,10 @@ impl<F: NorFlash> Store<F> {
         Ok(newest)
     }
 
-    /// The first slot of a sector with nothing written in it or after it.
-    fn blank_slot(&mut self, sector: u32) -> Result<Option<u32>, StoreError<F::Error>> {
+    /// The first slot of a sector, from an address on, with nothing written in it or after it.
+    fn blank_slot(&mut self, sector: u32, from: u32) -> Result<Option<u32>, StoreError<F::Error>> {
         let mut blank = None;
-        for address in Self::slots(sector..sector + 1) {
+        for address in Self::slots(sector..sector + 1).filter(|address| *address >= from) {
             if matches!(self.content(address)?, Content::Blank) {
                 blank = blank.or(Some(address));
             } else {

@@ -7,6 +7,7 @@ pub mod bridge;
 #[cfg(target_os = "none")]
 pub mod bus;
 pub mod encoders;
+pub mod flash;
 pub mod outputs;
 #[cfg(target_os = "none")]
 pub mod rig;

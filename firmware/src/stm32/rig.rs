@@ -2,7 +2,6 @@
 
 use core::marker::PhantomData;
 
-use embedded_storage::nor_flash::NorFlash;
 use muslip_control::board::{Actuators, Board, NotStored, RawSample, Sensors};
 use muslip_control::brake::BrakeOutput;
 use muslip_control::rates::Rates;
@@ -12,6 +11,7 @@ use muslip_record::Parameters;
 use super::bridge::{Bridge, Spi};
 use super::bus::Bus;
 use super::encoders::Encoders;
+use super::flash::{self, ParameterFlash};
 use super::millivolt;
 use super::outputs::{self, DumpPin, ValvePwm};
 use super::watchdog::Watchdog;
@@ -71,10 +71,7 @@ pub trait Chip {
     /// Its rates.
     const RATES: Rates;
     /// Where it keeps parameters.
-    type Flash: NorFlash;
-
-    /// That, of which there is one user.
-    fn flash() -> Self::Flash;
+    type Flash: flash::Interface;
 
     /// Starts both converters and their first conversions, so that the first sample finds one of each.
     fn start_converters();
@@ -94,7 +91,7 @@ pub struct RigSensors<C> {
 /// The rig's valves, watchdog and flash.
 pub struct RigActuators<C: Chip> {
     valves: Valves<ValvePwm<Bus>, DumpPin<Bus>>,
-    store: Store<C::Flash>,
+    store: Store<ParameterFlash<C::Flash, Bus>>,
     watchdog: Watchdog<Bus>,
 }
 
@@ -149,7 +146,7 @@ pub fn start<C: Chip>() -> (Rig<C>, Option<Loaded>) {
     set_up(on_timer, &mut Bus);
     let (proportional, dump) = outputs::outputs(Bus, tables.tim1, tables.valve_period);
     let valves = Valves::new(proportional, dump);
-    let mut store = Store::new(C::flash());
+    let mut store = Store::new(ParameterFlash::new(Bus));
     let loaded = store.load().ok().flatten();
     set_up(tables.encoders_clock, &mut Bus);
     let levels = [port_c, port_b].map(|port| Bus.read(port.levels()) & 1 << ENCODER_LINE != 0);

@@ -8,7 +8,7 @@ use muslip_control::rates::Rates;
 use muslip_control::store::Loaded;
 use stm32f4::stm32f405::Peripherals;
 
-use super::flash::ParameterFlash;
+use super::flash::Sectors;
 use super::settings::{CORE_HZ, RATES};
 use super::{clock, table};
 use crate::bits::low_u16;
@@ -73,11 +73,7 @@ const CONVERTERS: [u32; 2] = [table::ADC1, table::ADC2];
 impl rig::Chip for Stm32f405 {
     const TABLES: Tables = table::TABLES;
     const RATES: Rates = RATES;
-    type Flash = ParameterFlash<Bus>;
-
-    fn flash() -> ParameterFlash<Bus> {
-        ParameterFlash::new(Bus)
-    }
+    type Flash = Sectors;
 
     fn start_converters() {
         set_up(&table::CONVERTERS, &mut Bus);

@@ -11,7 +11,7 @@ use super::any::{AnyActuators, AnyBoard, AnySensors};
 use super::chip::Stm32f405;
 use super::settings::{CORE_HZ, CYCLES_PER_SAMPLE, HSI_HZ, RATES};
 use super::{chip, emulator, table, uart};
-use crate::board::{LINK_PRIORITY, SAMPLING_PRIORITY, Started, origin, start_timer};
+use crate::board::{Started, origin, set_priorities, start_timer};
 use crate::chip::{Chip, Took};
 use crate::fault;
 use crate::registers::first_wrong;
@@ -91,15 +91,10 @@ impl Chip for Stm32f405 {
     /// By the timer on the chip, by the simulator's frames in the emulator.
     #[allow(unsafe_code, reason = "start-up sets priorities")]
     fn start_sampling() {
-        // SAFETY: called once; nobody else has the core's peripherals.
-        let mut core = unsafe { cortex_m::Peripherals::steal() };
-        // SAFETY: the host link goes above sampling, which takes longer than its next byte; nothing relies on
-        // another order. docs/design/0013-silicon.md.
+        set_priorities(Interrupt::USART2);
+        // SAFETY: called once; nobody else has the core's peripherals, and nothing relies on another order.
         unsafe {
-            core.NVIC
-                .set_priority(Interrupt::USART2, LINK_PRIORITY << 4);
-            core.SCB
-                .set_priority(SystemHandler::SysTick, SAMPLING_PRIORITY << 4);
+            let mut core = cortex_m::Peripherals::steal();
             core.NVIC.set_priority(Interrupt::USART3, RIG_PRIORITY << 4);
         }
         if emulator::is_emulated() {

@@ -1,17 +1,16 @@
 //! What of the rig is this chip's own: its converters, its start-up, and what the main loop needs of it.
 
 use cortex_m::peripheral::NVIC;
-use cortex_m::peripheral::scb::SystemHandler;
 use muslip_control::controller::Identity;
 use muslip_control::rates::Rates;
 use muslip_record::Parameters;
 use stm32g4::stm32g474::{Interrupt, Peripherals};
 
-use super::flash::{ParameterFlash, forgives};
+use super::flash::{Pages, forgives};
 use super::settings::{CORE_HZ, CYCLES_PER_SAMPLE, HSI_HZ, RATES};
 use super::{clock, table, uart};
 use crate::bits::low_u16;
-use crate::board::{LINK_PRIORITY, SAMPLING_PRIORITY, Started, origin, start_timer};
+use crate::board::{Started, origin, set_priorities, start_timer};
 use crate::chip::Chip;
 use crate::fault;
 use crate::registers::{Registers, set_up};
@@ -72,11 +71,7 @@ const CONVERTERS: [u32; 2] = [table::ADC1, table::ADC2];
 impl rig::Chip for Stm32g474 {
     const TABLES: Tables = table::TABLES;
     const RATES: Rates = RATES;
-    type Flash = ParameterFlash<Bus>;
-
-    fn flash() -> ParameterFlash<Bus> {
-        ParameterFlash::new(Bus)
-    }
+    type Flash = Pages;
 
     /// Calibrated first (21.4.8, 21.4.9).
     fn start_converters() {
@@ -120,17 +115,8 @@ impl Chip for Stm32g474 {
 
     const CYCLES_PER_SAMPLE: u32 = CYCLES_PER_SAMPLE;
 
-    #[allow(unsafe_code, reason = "start-up sets priorities")]
     fn start_sampling() {
-        // SAFETY: called once; nobody else has the core's peripherals.
-        let mut core = unsafe { cortex_m::Peripherals::steal() };
-        // SAFETY: nothing relies on another order; docs/design/0013-silicon.md.
-        unsafe {
-            core.NVIC
-                .set_priority(Interrupt::USART2, LINK_PRIORITY << 4);
-            core.SCB
-                .set_priority(SystemHandler::SysTick, SAMPLING_PRIORITY << 4);
-        }
+        set_priorities(Interrupt::USART2);
         let clock_hz = if clock::runs_at_full_clock() {
             CORE_HZ
         } else {
