@@ -160,7 +160,7 @@ impl<T: Real> Compensation<T> {
     /// relative errors refer to. Memory: 4 N + some 40 numbers.
     ///
     /// # Errors
-    /// [`CompensationError::OutOfRange`] naming the first figure outside its range,
+    /// [`CompensationError::OutOfRange`] naming the first parameter outside its range,
     /// [`CompensationError::DelayDoesNotFit`].
     pub fn build<const N: usize>(
         self,

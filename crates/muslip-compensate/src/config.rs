@@ -6,9 +6,9 @@ use super::effect::{
 };
 use super::error::Parameter;
 
-/// Which effects to compensate, each with its figures.
+/// Which effects to compensate, each with its parameters.
 ///
-/// Figures that make an effect vanish (no error, no share, no length) give exactly, bit for bit, the
+/// Parameters that make an effect vanish (no error, no share, no length) give exactly, bit for bit, the
 /// update without it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]

@@ -1,4 +1,4 @@
-//! The effects, each with its figures, and what those must satisfy.
+//! The effects, each with its parameters, and what those must satisfy.
 
 use muslip::real::Real;
 
@@ -178,8 +178,8 @@ pub struct ThermalFade<T> {
 /// The check of one parameter; the error names the parameter that is out of range.
 type Checked = Result<(), Parameter>;
 
-fn demand(holds: bool, figure: Parameter) -> Checked {
-    if holds { Ok(()) } else { Err(figure) }
+fn demand(holds: bool, parameter: Parameter) -> Checked {
+    if holds { Ok(()) } else { Err(parameter) }
 }
 
 fn within<T: Real>(value: T, limit: f64) -> bool {

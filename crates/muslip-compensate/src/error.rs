@@ -2,7 +2,7 @@ use core::fmt;
 
 use muslip::sample::{Channel, SampleError};
 
-/// A figure of a [`Compensation`](super::Compensation).
+/// A parameter of a [`Compensation`](super::Compensation).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -40,7 +40,7 @@ pub enum Parameter {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub enum CompensationError {
-    /// The figure is not finite or outside the range that [`Parameter`] states.
+    /// The parameter is not finite or outside the range that [`Parameter`] states.
     OutOfRange(Parameter),
     /// The delay line holds fewer samples than delay and sampling step need.
     DelayDoesNotFit {
@@ -104,7 +104,7 @@ impl fmt::Display for Parameter {
 impl fmt::Display for CompensationError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::OutOfRange(figure) => write!(f, "{figure} is outside its range"),
+            Self::OutOfRange(parameter) => write!(f, "{parameter} is outside its range"),
             Self::DelayDoesNotFit { capacity } => {
                 write!(f, "force delay is longer than {capacity} samples hold")
             }

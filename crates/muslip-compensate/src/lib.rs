@@ -40,7 +40,7 @@
 //! # What remains
 //!
 //! White noise of the slip passes the law's curvature, as without compensation. The first delay after a
-//! start or a gap gives no measurement; filters settle on their first input. Figures are taken as
+//! start or a gap gives no measurement; filters settle on their first input. Parameters are taken as
 //! known: their uncertainty is not in the filter's covariance.
 //!
 //! # Features

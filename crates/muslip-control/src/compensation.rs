@@ -46,7 +46,7 @@ pub fn filters_force(p: &CompensationParameters) -> bool {
     p.force_lag_s.is_some() || matches!(p.relaxation, Some(RelaxationCompensation::Force { .. }))
 }
 
-/// The first effect whose figures are outside their ranges, counted from 0 in the order of the type's fields.
+/// The first effect whose parameters are outside their ranges, counted from 0 in the order of the type's fields.
 ///
 /// # Errors
 /// That number.

@@ -50,10 +50,10 @@ fn main() -> Result<(), Box<dyn Error>> {
         for band in [Band::Fast, Band::Slow] {
             let limits = monitor.limits(band);
             let alarms = monitor.alarms(balance, band);
-            if let Some(figures) = monitor.figures(balance, band) {
+            if let Some(statistics) = monitor.statistics(balance, band) {
                 println!(
                     "{balance:?}, {band:?}: {:.2} (at most {:.2}), {:.2} (at most {:.2}), {alarms}",
-                    figures.mean_square, limits.mean_square, figures.lag_one, limits.lag_one
+                    statistics.mean_square, limits.mean_square, statistics.lag_one, limits.lag_one
                 );
             }
         }

@@ -59,14 +59,14 @@ impl<T: Real> Detection<T> {
 
 /// What one window came to.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Figures<T> {
+pub struct Statistics<T> {
     /// Mean square of the normalised innovations: 1 under the right model, dimensionless.
     pub mean_square: T,
     /// Mean product of neighbouring innovations: 0 under the right model, dimensionless.
     pub lag_one: T,
 }
 
-/// The limits that a window's figures are held against.
+/// The limits that a window's statistics are held against.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Limits<T> {
     /// Innovations in a window.
@@ -96,10 +96,10 @@ impl<T: Real> Limits<T> {
         }
     }
 
-    /// The larger of both figures over their limits: above 1 the window is inconsistent.
-    pub fn share(&self, figures: &Figures<T>) -> T {
-        let square = figures.mean_square / self.mean_square;
-        let neighbours = figures.lag_one / self.lag_one;
+    /// The larger of both statistics over their limits: above 1 the window is inconsistent.
+    pub fn share(&self, statistics: &Statistics<T>) -> T {
+        let square = statistics.mean_square / self.mean_square;
+        let neighbours = statistics.lag_one / self.lag_one;
         square.max(neighbours)
     }
 }
@@ -114,14 +114,14 @@ fn upper_quantile<T: Real>(probability: T) -> T {
     t - above / below
 }
 
-/// Sums of a window that is filling, and the figures of the last one that was full.
+/// Sums of a window that is filling, and the statistics of the last one that was full.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Window<T> {
     squares: T,
     products: T,
     previous: T,
     count: u16,
-    pub(crate) latest: Option<Figures<T>>,
+    pub(crate) latest: Option<Statistics<T>>,
     pub(crate) alarms: u32,
 }
 
@@ -146,14 +146,14 @@ impl<T: Real> Window<T> {
             return;
         }
         let n = T::from_f64(f64::from(self.count));
-        let figures = Figures {
+        let statistics = Statistics {
             mean_square: self.squares / n,
             lag_one: self.products / n,
         };
-        if limits.share(&figures) > T::ONE {
+        if limits.share(&statistics) > T::ONE {
             self.alarms = self.alarms.saturating_add(1);
         }
-        self.latest = Some(figures);
+        self.latest = Some(statistics);
         (self.squares, self.products, self.count) = (T::ZERO, T::ZERO, 0);
     }
 }

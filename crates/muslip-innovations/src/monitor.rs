@@ -3,7 +3,7 @@
 use muslip::law::Rudd;
 use muslip::real::Real;
 
-use crate::detection::{Band, BandLimits, Bands, Figures, Limits, Window};
+use crate::detection::{Band, BandLimits, Bands, Limits, Statistics, Window};
 use crate::level::{Level, Noise, Rate, Step};
 use crate::reading::{Reading, StepError};
 use crate::settings::{Coloured, Setting, Settings, SettingsError};
@@ -144,10 +144,10 @@ impl<T: Real> Monitor<T> {
         let mut farthest = T::ONE;
         for balance in Balance::ALL {
             for band in [Band::Fast, Band::Slow] {
-                let Some(figures) = self.figures(balance, band) else {
+                let Some(statistics) = self.statistics(balance, band) else {
                     continue;
                 };
-                let share = self.limits(band).share(&figures);
+                let share = self.limits(band).share(&statistics);
                 if share > farthest {
                     farthest = share;
                     verdict = Verdict::Inconsistent { balance, band };
@@ -162,8 +162,8 @@ impl<T: Real> Monitor<T> {
     /// What the latest full windows of one balance say.
     pub fn verdict_of(&self, balance: Balance) -> Verdict {
         let share = |band| {
-            let figures = self.figures(balance, band)?;
-            Some((self.limits(band).share(&figures), band))
+            let statistics = self.statistics(balance, band)?;
+            Some((self.limits(band).share(&statistics), band))
         };
         let shares = [share(Band::Fast), share(Band::Slow)];
         let farthest = shares.into_iter().flatten();
@@ -174,8 +174,8 @@ impl<T: Real> Monitor<T> {
         }
     }
 
-    /// Figures of the latest full window; `None` before the first.
-    pub fn figures(&self, balance: Balance, band: Band) -> Option<Figures<T>> {
+    /// Statistics of the latest full window; `None` before the first.
+    pub fn statistics(&self, balance: Balance, band: Band) -> Option<Statistics<T>> {
         self.window(balance, band).latest
     }
 
@@ -184,7 +184,7 @@ impl<T: Real> Monitor<T> {
         self.window(balance, band).alarms
     }
 
-    /// What figures of this band are held against.
+    /// What statistics of this band are held against.
     pub fn limits(&self, band: Band) -> Limits<T> {
         match band {
             Band::Fast => self.limits.fast,

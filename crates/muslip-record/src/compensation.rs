@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-/// Distortions to compensate before the estimator, each with its figures; equations: the crate `muslip-compensate`.
+/// Distortions to compensate before the estimator, each with its parameters; equations: the crate `muslip-compensate`.
 ///
 /// They change what the estimate is made of, and nothing that an interlock or the state machine looks at.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]

@@ -61,7 +61,7 @@ pub fn update(memory: &mut Memory, slip: f32, friction: f32) {
 /// Mean squares of the fast band, of tyre and wheel.
 pub fn answer(memory: &Memory) -> [f32; 2] {
     [Balance::Tyre, Balance::Wheel].map(|balance| {
-        let figures = memory.monitor.figures(balance, Band::Fast);
-        figures.map_or(0.0, |figures| figures.mean_square)
+        let statistics = memory.monitor.statistics(balance, Band::Fast);
+        statistics.map_or(0.0, |statistics| statistics.mean_square)
     })
 }
