@@ -9,7 +9,7 @@ use crate::campaign::{Rig, Run};
 use crate::cleaning::{clean, stretches};
 use crate::series::{Channel, DataFault, GAP_STEPS, Series};
 use crate::slip::slip;
-use crate::smooth::{Smoothed, difference_sigma, median_in_place, smooth};
+use crate::smooth::{Smoothed, difference_sigma, median_in_place, noise_sigma, smooth};
 use crate::turn;
 
 /// Slowest speed at which slip is defined, in m/s.
@@ -147,7 +147,7 @@ pub fn prepare(
 
     let finite = |k: usize| omega[k].is_finite() && v[k].is_finite() && load[k].is_finite();
     let continuous = stretches(finite, &breaks, 3);
-    let (omega_sigma, v_sigma) = (difference_sigma(&omega), difference_sigma(&v));
+    let [omega_sigma, v_sigma] = [&omega, &v].map(|x| noise_sigma(x, typical_dt));
     let load_sigma = difference_sigma(&load);
     // No window may average over more than a sixth of a wheel revolution on either side.
     let reach: Vec<f64> = (0..n)

@@ -49,6 +49,49 @@ pub fn difference_sigma(values: &[f64]) -> f64 {
     }
 }
 
+/// Least share of samples on a straight line between their neighbours in a channel that was counted or held.
+const DRAWN: f64 = 0.25;
+/// Share of a large bend up to which a sample is on a straight line.
+const STRAIGHT: f64 = 0.02;
+/// Longest means in s by which noise with a memory is heard.
+const LONGEST_MEAN_S: f64 = 0.0125;
+
+/// Whether many samples lie on straight lines: readings that were held or counted say the same several times, and so do
+/// lines between them.
+fn is_drawn(values: &[f64]) -> bool {
+    let bends = values.windows(3).map(|w| (w[0] - 2.0 * w[1] + w[2]).abs());
+    let mut bends: Vec<f64> = bends.filter(|b| b.is_finite()).collect();
+    if bends.is_empty() {
+        return false;
+    }
+    let at = bends.len() * 9 / 10;
+    let large = *bends.select_nth_unstable_by(at, f64::total_cmp).1;
+    let straight = bends.iter().filter(|b| **b <= STRAIGHT * large);
+    large > 0.0 && straight.count() as f64 > DRAWN * bends.len() as f64
+}
+
+/// Standard deviation of the white noise that is as large over a smoother's window as a channel's own. Readings that were
+/// held or counted, or lines between them, err alike for several samples: their noise is that of means, times the root of
+/// how many samples each is of, as far as that grows.
+#[must_use]
+pub fn noise_sigma(values: &[f64], step_s: f64) -> f64 {
+    let fine = difference_sigma(values);
+    if !is_drawn(values) {
+        return fine;
+    }
+    let of_means = |samples: usize| {
+        let means: Vec<f64> = values
+            .chunks_exact(samples)
+            .map(|own| own.iter().sum::<f64>() / samples as f64)
+            .collect();
+        difference_sigma(&means) * (samples as f64).sqrt()
+    };
+    (2..)
+        .take_while(|samples| *samples as f64 * step_s <= LONGEST_MEAN_S)
+        .map(of_means)
+        .fold(fine, f64::max)
+}
+
 /// Median; reorders its argument. `NaN` for an empty slice.
 pub fn median_in_place(values: &mut [f64]) -> f64 {
     if values.is_empty() {
@@ -240,6 +283,29 @@ mod tests {
     fn noise_level_is_read_off_third_differences() {
         let (_, _, measured) = noisy(0.15, |t| 60.0 + 20.0 * (3.0 * t).sin());
         assert!((difference_sigma(&measured) - 0.15).abs() < 0.01);
+    }
+
+    #[test]
+    fn lines_between_noisy_readings_are_as_noisy_as_the_readings_over_a_window() {
+        let (_, _, white) = noisy(0.15, |t| 60.0 + 20.0 * (3.0 * t).sin());
+        // Every fourth reading held, and lines between these: over a window twice the std of one reading.
+        let held: Vec<f64> = (0..white.len()).map(|k| white[k / 4 * 4]).collect();
+        let lines: Vec<f64> = (0..white.len() - 4)
+            .map(|k| {
+                let share = (k % 4) as f64 / 4.0;
+                white[k / 4 * 4] * (1.0 - share) + white[k / 4 * 4 + 4] * share
+            })
+            .collect();
+        for drawn in [held, lines] {
+            let (own, fine) = (noise_sigma(&drawn, 0.002), difference_sigma(&drawn));
+            // Means of six samples hold most of it.
+            assert!(
+                (0.2..0.33).contains(&own) && own > 1.3 * fine,
+                "{own} {fine}"
+            );
+        }
+        // What is neither is as before.
+        assert!((noise_sigma(&white, 0.002) - difference_sigma(&white)).abs() < 1e-15);
     }
 
     #[test]
