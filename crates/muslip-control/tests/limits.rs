@@ -6,7 +6,7 @@ use muslip_control::conversion::Converted;
 use muslip_control::encoder::Speed;
 use muslip_control::interlock::{
     Circumstances, FROZEN_SAMPLES, FaultSet, Interlocks, JUMP_SAMPLES, LARGEST_CODE,
-    LOCK_SPEED_M_S, LOCKED_SHARE, STUCK_SAMPLES, wheel_change_rad_s2,
+    LOCK_SPEED_M_S, LOCKED_SHARE, ROLLING_SLIP, STUCK_SAMPLES, wheel_change_rad_s2,
 };
 use muslip_control::rates::Rates;
 use muslip_record::{Fault, Parameters};
@@ -242,6 +242,20 @@ fn speeds_disagree_beyond_a_slip_of_a_twentieth_for_more_than_two_seconds_withou
     }
     for slip in [0.051, -0.051, 0.5, -0.5] {
         assert_eq!(rolls(slip, vehicle, false), Some(2_001), "{slip}");
+    }
+    // At a speed of which that slip is exact in single precision.
+    let exact = |vehicle: &f32| {
+        let off = ROLLING_SLIP * vehicle;
+        ((vehicle + off) - vehicle).to_bits() == off.to_bits()
+    };
+    let vehicle = (0..1_000).map(|i| 8.0 + i as f32 / 1_048_576.0).find(exact);
+    let vehicle = vehicle.unwrap_or(f32::NAN);
+    let surface = vehicle + ROLLING_SLIP * vehicle;
+    for (surface, after) in [(surface, None), (above(surface), Some(2_001))] {
+        let mut seen = Seen::rolling(vehicle);
+        seen.converted.wheel = turning(surface / RADIUS_M);
+        let disagree = Checked::after(vehicle).until(Fault::SpeedsDisagree, 4_000, seen);
+        assert_eq!(disagree, after, "{vehicle} {surface}");
     }
     assert_eq!(rolls(0.5, vehicle, true), None);
     assert_eq!(rolls(0.5, LOCK_SPEED_M_S, false), None);
