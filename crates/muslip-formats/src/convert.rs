@@ -6,6 +6,7 @@ use std::sync::Arc;
 
 use crate::error::{FormatError, Problem};
 use crate::format::Format;
+pub use crate::made::{Fault, Made, Resampled};
 use crate::map::{Entry, Map};
 use crate::raster::{self, Done};
 use crate::roles::{self, Assigned, Refused, Roles, TIME};
@@ -17,30 +18,6 @@ use crate::units::{self, Quantity};
 pub(crate) const MOST_GAPS: usize = 100;
 /// Most rows that a raster of `rate_hz` may have.
 const MOST_ROWS: f64 = 2e8;
-
-/// Something of a channel that a diagnosis must know.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Fault {
-    /// The column.
-    pub column: String,
-    /// From when, in s of the recording's time.
-    pub start_s: f64,
-    /// Until when.
-    pub end_s: f64,
-    /// What, in words.
-    pub what: String,
-}
-
-/// A column whose channel was measured at other times than the recording's.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Resampled {
-    /// The column.
-    pub column: String,
-    /// The channel's own sampling interval in s.
-    pub interval_s: f64,
-    /// What was done to it.
-    pub done: Done,
-}
 
 /// A recording made of a file of another format.
 #[derive(Debug, Clone)]
@@ -55,10 +32,8 @@ pub struct Converted {
     pub columns: Vec<Vec<f64>>,
     /// What was read, converted, interpolated, decimated or dropped, one line each.
     pub notes: Vec<String>,
-    /// What of it a diagnosis must know.
-    pub faults: Vec<Fault>,
-    /// Which columns were measured at other times.
-    pub resampled: Vec<Resampled>,
+    /// What of it a diagnosis must know, also of a conversion that this file came from.
+    pub made: Made,
     /// Columns of the contract that no channel became, and why.
     pub refused: Vec<Refused>,
     /// The roles as they were found, as a map.
@@ -109,8 +84,7 @@ pub fn convert(file: &mut SourceFile, map: Option<&Map>) -> Result<Converted, Fo
         names: vec![TIME.to_owned()],
         columns: vec![grid.iter().map(|time| time - start_s).collect()],
         notes: Vec::new(),
-        faults: Vec::new(),
-        resampled: Vec::new(),
+        made: Made::default(),
         refused: roles.refused.clone(),
         map: roles.as_map(&channels, &time),
         guessed: roles.guessed,
@@ -120,6 +94,8 @@ pub fn convert(file: &mut SourceFile, map: Option<&Map>) -> Result<Converted, Fo
     for one in ready {
         let (values, done) = raster::onto(&grid, &one.times, &one.values, one.one.entry.method);
         out.tell(&one, &values, done, &grid, start_s);
+        out.made
+            .inherit(file.made(), &one.channel.name, &one.one.column);
         out.names.push(one.one.column);
         out.columns.push(values);
     }
@@ -131,7 +107,7 @@ pub fn convert(file: &mut SourceFile, map: Option<&Map>) -> Result<Converted, Fo
     for fault in faults.into_iter().chain(file.faults()) {
         if told.insert(fault.clone()) {
             out.notes.push(format!("fault: {fault}"));
-            out.faults.push(Fault {
+            out.made.faults.push(Fault {
                 column: TIME.to_owned(),
                 start_s: from,
                 end_s: to,
@@ -139,6 +115,7 @@ pub fn convert(file: &mut SourceFile, map: Option<&Map>) -> Result<Converted, Fo
             });
         }
     }
+    out.made.inherit(file.made(), TIME, TIME);
     Ok(out)
 }
 
@@ -331,14 +308,14 @@ impl Converted {
             return;
         };
         if let Some(interval_s) = raster::interval_s(&one.times).filter(|_| done != Done::Kept) {
-            self.resampled.push(Resampled {
+            self.made.resampled.push(Resampled {
                 column: column.clone(),
                 interval_s,
                 done,
             });
         }
         let mut fault = |start: f64, end: f64, what: String| {
-            self.faults.push(Fault {
+            self.made.faults.push(Fault {
                 column: column.clone(),
                 start_s: start - start_s,
                 end_s: end - start_s,
@@ -362,29 +339,41 @@ impl Converted {
             ),
         }
         let longest = raster::longest_step_s(&one.times);
-        for pair in one
-            .times
-            .windows(2)
-            .filter(|pair| pair[1] - pair[0] > longest)
+        let gaps = one.times.windows(2);
+        let gaps = gaps.filter(|pair| pair[1] - pair[0] > longest);
+        let gaps: Vec<(f64, f64)> = gaps
             .take(MOST_GAPS)
-        {
-            fault(
-                pair[0],
-                pair[1],
-                format!("gap of {} s", rounded(pair[1] - pair[0])),
-            );
-        }
-        if one.invalid > 0 {
-            fault(
-                *first,
-                *last,
-                format!(
-                    "{} readings are invalid in the file: left empty",
-                    one.invalid
-                ),
-            );
-        }
+            .map(|pair| (pair[0] - start_s, pair[1] - start_s))
+            .collect();
+        let ends = (first - start_s, last - start_s);
+        self.made
+            .faults
+            .extend(reading_faults(column, ends, &gaps, one.invalid));
     }
+}
+
+/// What a diagnosis must know of a column's readings: gaps, and those that are invalid between the first and the last of them.
+pub(crate) fn reading_faults(
+    column: &str,
+    (first_s, last_s): (f64, f64),
+    gaps: &[(f64, f64)],
+    invalid: u64,
+) -> Vec<Fault> {
+    let fault = |start_s: f64, end_s: f64, what: String| Fault {
+        column: column.to_owned(),
+        start_s,
+        end_s,
+        what,
+    };
+    let gaps = gaps.iter();
+    let mut faults: Vec<Fault> = gaps
+        .map(|&(from, to)| fault(from, to, format!("gap of {} s", rounded(to - from))))
+        .collect();
+    if invalid > 0 {
+        let what = format!("{invalid} readings are invalid in the file: left empty");
+        faults.push(fault(first_s, last_s, what));
+    }
+    faults
 }
 
 /// Three digits behind the point at most.

@@ -8,6 +8,7 @@ use encoding_rs_io::{DecodeReaderBytes, DecodeReaderBytesBuilder};
 
 use crate::error::{Place, Problem};
 use crate::file_bytes::FileBytes;
+use crate::made::{COMMENT_BYTES, Made};
 use crate::source::{Channel, Kind, Pieces, Series, Source};
 use crate::time_text::stamp;
 use crate::units;
@@ -29,6 +30,7 @@ pub(crate) struct CsvSource {
     channels: Vec<Channel>,
     /// How each column is read.
     cells: Vec<Cells>,
+    made: Made,
     faults: Vec<String>,
 }
 
@@ -86,6 +88,7 @@ impl CsvSource {
             encoding,
             channels: Vec::new(),
             cells,
+            made: made_of(&bytes)?,
             faults: Vec::new(),
             layout,
         };
@@ -235,6 +238,14 @@ impl Rows<'_> {
     }
 }
 
+/// What the comments say of a conversion that the text came from.
+fn made_of(bytes: &FileBytes) -> Result<Made, Problem> {
+    let length = bytes.length();
+    let first = bytes.up_to(0, COMMENT_BYTES)?;
+    let last = bytes.up_to(length.saturating_sub(COMMENT_BYTES), COMMENT_BYTES)?;
+    Ok(Made::of_text(&first, &last, length <= COMMENT_BYTES))
+}
+
 /// Columns as series.
 fn series(columns: Vec<Vec<f64>>) -> Vec<Series> {
     let of = |values| Series {
@@ -251,6 +262,10 @@ impl Source for CsvSource {
 
     fn channels(&self) -> &[Channel] {
         &self.channels
+    }
+
+    fn made(&self) -> Made {
+        self.made.clone()
     }
 
     fn read(&mut self, wanted: &[usize]) -> Result<Vec<Series>, Problem> {

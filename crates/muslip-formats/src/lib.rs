@@ -34,6 +34,7 @@ mod guard;
 #[cfg(feature = "hdf5")]
 mod hdf5;
 pub mod listing;
+pub mod made;
 pub mod map;
 #[cfg(feature = "mat")]
 mod mat;

@@ -4,6 +4,7 @@ use std::io;
 
 use crate::convert::{self, Prepared};
 use crate::error::{FormatError, Problem};
+use crate::made::{Fault, Made};
 use crate::map::Map;
 use crate::roles::TIME;
 use crate::source::Series;
@@ -28,6 +29,8 @@ pub struct Streamed {
     pub start_time: Option<String>,
     /// What was read, converted or dropped, one line each, as [`convert::Converted::notes`].
     pub notes: Vec<String>,
+    /// What of it a diagnosis must know.
+    pub made: Made,
 }
 
 /// Why there is none.
@@ -202,18 +205,58 @@ impl Stream {
                 "{untimed} readings without a time stamp were left out"
             ));
         }
-        for (from, to) in steps.gaps(convert::MOST_GAPS) {
-            faults.push(format!(
+        let start_s = start_s.unwrap_or(0.0);
+        let gaps: Vec<(f64, f64)> = steps
+            .gaps(convert::MOST_GAPS)
+            .into_iter()
+            .map(|(from, to)| (from - start_s, to - start_s))
+            .collect();
+        faults.extend(file.faults());
+        let ends = steps.ends.unwrap_or_default();
+        let ends = (ends.0 - start_s, ends.1 - start_s);
+        let made = self.made(file, ends, &gaps, &told, &faults);
+        let in_words = gaps.iter().map(|(from, to)| {
+            format!(
                 "gap of {} s at {} s",
                 convert::rounded(to - from),
-                convert::rounded(from - start_s.unwrap_or(0.0))
-            ));
-        }
+                convert::rounded(*from)
+            )
+        });
+        faults.extend(in_words);
         Ok(Streamed {
             rows: steps.count,
             start_time: file.start_time(),
-            notes: self.notes(file, &steps, &told, faults),
+            notes: self.notes(&steps, &told, faults, file),
+            made,
         })
+    }
+
+    /// What a diagnosis must know: of each column, and of the file as a whole.
+    fn made(
+        &self,
+        file: &SourceFile,
+        ends: (f64, f64),
+        gaps: &[(f64, f64)],
+        told: &[(u64, u64)],
+        faults: &[String],
+    ) -> Made {
+        let mut made = Made::default();
+        let Prepared {
+            channels, roles, ..
+        } = &self.prepared;
+        for (one, &(_, invalid)) in roles.assigned.iter().zip(told) {
+            let faults = convert::reading_faults(&one.column, ends, gaps, invalid);
+            made.faults.extend(faults);
+            made.inherit(file.made(), &channels[one.channel].name, &one.column);
+        }
+        made.faults.extend(faults.iter().map(|what| Fault {
+            column: TIME.to_owned(),
+            start_s: ends.0,
+            end_s: ends.1,
+            what: what.clone(),
+        }));
+        made.inherit(file.made(), TIME, TIME);
+        made
     }
 
     /// Times in s, and the series of the columns.
@@ -241,10 +284,10 @@ impl Stream {
 
     fn notes(
         &self,
-        file: &SourceFile,
         steps: &Steps,
         told: &[(u64, u64)],
         faults: Vec<String>,
+        file: &SourceFile,
     ) -> Vec<String> {
         let Prepared {
             channels, roles, ..
@@ -272,8 +315,7 @@ impl Stream {
                 invalid,
             ));
         }
-        let faults = faults.into_iter().chain(file.faults());
-        notes.extend(faults.map(|fault| format!("fault: {fault}")));
+        notes.extend(faults.into_iter().map(|fault| format!("fault: {fault}")));
         notes
     }
 }
