@@ -3,7 +3,7 @@
 //! [`SourceFile::open`] tells the format by the file's first bytes and lists its channels; [`SourceFile::read`] reads chosen ones as `f64` with
 //! their time and validity. [`map`] and [`roles`] say which channel is which column of a recording, [`units`] brings readings to SI, [`raster`]
 //! brings channels of different rates onto one time, and [`convert`] does it all;
-//! [`stream`] does it some rows at a time where all channels share one time.
+//! [`stream`] does it some rows at a time, [`made`] is what a recording says of it afterwards.
 //!
 //! | feature | format | told by |
 //! | --- | --- | --- |

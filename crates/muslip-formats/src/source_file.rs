@@ -64,6 +64,17 @@ impl SourceFile {
         })
     }
 
+    /// A source that is open already.
+    #[cfg(test)]
+    pub(crate) fn of_source(path: PathBuf, format: Format, source: Box<dyn Source>) -> Self {
+        Self {
+            path,
+            format,
+            made: source.made(),
+            source,
+        }
+    }
+
     /// The format that a file is in, by its bytes.
     ///
     /// # Errors
