@@ -9,8 +9,9 @@ use std::sync::Arc;
 
 use crate::MOST_BYTES;
 use crate::error::Problem;
-use crate::file_bytes::{FileBytes, Number};
+use crate::file_bytes::FileBytes;
 use crate::format::Format;
+use crate::number::Number;
 use crate::source::{Channel, Kind, Series, Source};
 
 /// Groups within groups that are followed.

@@ -26,6 +26,8 @@ mod cells;
 pub mod convert;
 #[cfg(feature = "csv")]
 mod csv_text;
+#[cfg(any(feature = "mat", feature = "tdms"))]
+mod cursor;
 mod error;
 mod export;
 mod file_bytes;
@@ -42,6 +44,8 @@ mod mat;
 mod mdf;
 #[cfg(feature = "mdf")]
 mod mdf_join;
+#[cfg(any(feature = "hdf5", feature = "mat", feature = "tdms"))]
+mod number;
 #[cfg(feature = "parquet")]
 mod parquet;
 pub mod raster;
@@ -56,6 +60,7 @@ mod tdms;
 mod tdms_property;
 #[cfg(feature = "tdms")]
 mod tdms_scaling;
+#[cfg(any(feature = "csv", feature = "mdf", feature = "tdms"))]
 mod time_text;
 pub mod units;
 

@@ -9,8 +9,10 @@ use std::io::{Read, Seek, SeekFrom};
 use flate2::read::ZlibDecoder;
 
 use crate::MOST_BYTES;
+use crate::cursor::Cursor;
 use crate::error::Problem;
-use crate::file_bytes::{Cursor, FileBytes, Number};
+use crate::file_bytes::FileBytes;
+use crate::number::Number;
 use crate::source::{Channel, Kind, Series, Source};
 
 /// Bytes in which the description of a matrix of numbers stands.
