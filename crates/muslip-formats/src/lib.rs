@@ -36,6 +36,8 @@ mod guard;
 #[cfg(feature = "hdf5")]
 mod hdf5;
 pub mod listing;
+#[cfg(feature = "hdf5")]
+mod lzf;
 pub mod made;
 pub mod map;
 #[cfg(feature = "mat")]
@@ -60,6 +62,10 @@ mod tdms;
 mod tdms_property;
 #[cfg(feature = "tdms")]
 mod tdms_scaling;
+#[cfg(feature = "tdms")]
+mod tdms_sensor;
+#[cfg(feature = "tdms")]
+mod tdms_thermocouple;
 #[cfg(any(feature = "csv", feature = "mdf", feature = "tdms"))]
 mod time_text;
 pub mod units;
