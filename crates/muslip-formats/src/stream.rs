@@ -329,7 +329,7 @@ impl Stream {
                 done[place] = way.done;
             }
         }
-        while let Some((times, mut kept)) = grid.next(&mut tracks[chosen], span_s)? {
+        while let Some(Next { times, mut kept }) = grid.next(&mut tracks[chosen], span_s)? {
             let (Some(&from), Some(&to)) = (times.first(), times.last()) else {
                 break;
             };
@@ -483,13 +483,15 @@ enum Grid {
     },
 }
 
+/// Some times of the raster, and the readings that the chosen group has there where its times are the raster's.
+struct Next {
+    times: Vec<f64>,
+    kept: Vec<Vec<f64>>,
+}
+
 impl Grid {
-    /// The next times within a span, and the readings that the chosen group has there where its times are the raster's; `None` at the end.
-    fn next(
-        &mut self,
-        chosen: &mut Track<'_>,
-        span_s: f64,
-    ) -> Result<Option<(Vec<f64>, Vec<Vec<f64>>)>, StreamError> {
+    /// The next times within a span; `None` at the end.
+    fn next(&mut self, chosen: &mut Track<'_>, span_s: f64) -> Result<Option<Next>, StreamError> {
         match self {
             Self::Times => {
                 while chosen.times.is_empty() {
@@ -502,12 +504,11 @@ impl Grid {
                 let rows = rows.clamp(1, MOST_ROWS.min(chosen.times.len()));
                 let times = chosen.times.drain(..rows).collect();
                 let columns = chosen.columns.iter_mut();
-                Ok(Some((
+                let kept = columns.map(|values| values.drain(..rows).collect());
+                Ok(Some(Next {
                     times,
-                    columns
-                        .map(|values| values.drain(..rows).collect())
-                        .collect(),
-                )))
+                    kept: kept.collect(),
+                }))
             }
             Self::Even {
                 first_s,
@@ -520,7 +521,10 @@ impl Grid {
                 let from = *next;
                 *next += count;
                 let times = (from..*next).map(|k| *first_s + k as f64 / *rate_hz);
-                Ok((count > 0).then(|| (times.collect(), Vec::new())))
+                Ok((count > 0).then(|| Next {
+                    times: times.collect(),
+                    kept: Vec::new(),
+                }))
             }
         }
     }
