@@ -203,6 +203,8 @@ def tdms():
     linear = 2.0 * raw + 10
     expect(name, [("g", "it's", 1 + 0.5 * linear - 0.25 * linear**2, None, "", [])])
 
+    sensors()
+
     # The generators of npTDMS's own tests; what it makes of them is what must be read.
     from nptdms.test import scenarios
     for parameter in scenarios.get_scenarios():
@@ -218,6 +220,59 @@ def tdms():
                         channels.append((group.name, channel.name, values, None, "", []))
         expect(name, channels, faults=None)
     daqmx()
+
+
+def sensors():
+    """Scales of sensors: what npTDMS makes of them, and for cold resistance thermometers the temperature that the voltage was computed from."""
+    from nptdms import ChannelObject, TdmsFile, TdmsWriter
+
+    def scale(kind, values, **properties):
+        every = {"Number_Of_Scales": 1, "Scaling_Status": "unscaled", "Scale[0]_Scale_Type": kind, f"Scale[0]_{kind}_Input_Source": 0xFFFFFFFF}
+        every |= {f"Scale[0]_{kind}_{key}": value for key, value in properties.items()}
+        return values, {f"NI_{key}": value for key, value in every.items()}
+
+    channels, exact = {}, {}
+    # Near 0 °C a difference of nearly equal numbers leaves fewer digits than are held against.
+    celsius = np.concatenate([np.linspace(-190.0, -5.0, 200), np.linspace(5.0, 600.0, 200)])
+    a, b, c = 3.9083e-3, -5.775e-7, -4.183e-12
+    ohm = 100.0 * (1 + a * celsius + b * celsius**2 + np.where(celsius < 0, c * (celsius - 100) * celsius**3, 0.0))
+    for wires in [2, 3, 4]:
+        name = f"rtd {wires}"
+        volt = 1e-3 * (ohm + {2: 2 * 0.25, 3: 0.25, 4: 0.0}[wires])
+        channels[name] = scale("RTD", volt, Current_Excitation=1e-3, R0_Nominal_Resistance=100.0, A=a, B=b, C=c,
+                               Lead_Wire_Resistance=0.25, Resistance_Configuration=wires)
+        exact[name] = celsius
+        for excitation, value in [(10134, 1e-4), (10322, 5.0)]:
+            volt = np.linspace(0.05, 2.0, 200)
+            channels[f"thermistor {wires} {excitation}"] = scale(
+                "Thermistor", volt, Excitation_Type=excitation, Excitation_Value=value, Resistance_Configuration=wires, R1_Reference_Resistance=5000.0,
+                Lead_Wire_Resistance=2.0, A=1.2873851e-3, B=2.3575235e-4, C=9.4978060e-8, Temperature_Offset=273.15)
+    for configuration in [10183, 10184, 10185, 10188, 10189, 10271, 10272]:
+        channels[f"strain {configuration}"] = scale(
+            "Strain", np.linspace(-0.02, 0.02, 201), Configuration=configuration, Poisson_Ratio=0.3, Gage_Resistance=350.0, Lead_Wire_Resistance=1.5,
+            Initial_Bridge_Voltage=1e-4, Gage_Factor=2.1, Bridge_Shunt_Calibration_Gain_Adjustment=1.01, Voltage_Excitation=2.5)
+    for kind in [10047, 10055, 10072, 10073, 10077, 10082, 10085, 10086]:
+        for direction, values in [(0, np.linspace(-6000.0, 70000.0, 500)), (1, np.linspace(-260.0, 1800.0, 500))]:
+            channels[f"thermocouple {kind} {direction}"] = scale("Thermocouple", values, Thermocouple_Type=kind, Scaling_Direction=direction)
+    name = "nptdms-sensors.tdms"
+    with TdmsWriter(OUT / name) as writer:
+        writer.write_segment([ChannelObject("sensors", key, values, properties=properties) for key, (values, properties) in channels.items()])
+    wanted = []
+    with TdmsFile.read(OUT / name) as file:
+        for key in channels:
+            values = file["sensors"][key][:]
+            if key in exact:
+                # npTDMS finds the roots of a polynomial there, with less accuracy than its inverse has.
+                assert np.allclose(values, exact[key], rtol=1e-9, atol=1e-9), key
+                values = exact[key]
+            wanted.append(("sensors", key, values, None, "", []))
+    expect(name, wanted)
+
+    name = "nptdms-unknown-scale.tdms"
+    with TdmsWriter(OUT / name) as writer:
+        writer.write_segment([ChannelObject("g", key, np.arange(5.0), properties=scale(kind, None, Configuration=1, Excitation_Type=1)[1])
+                              for key, kind in [("odd", "Reciprocal"), ("bridge", "Strain"), ("divider", "Thermistor")]])
+    expect(name, [], refused=["odd", "bridge", "divider"])
 
 
 def daqmx():
@@ -297,6 +352,24 @@ def mat():
         expect(name, channels, faults=None)
 
 
+def matlab_table():
+    """A table as MATLAB saves it in v7: an object of a class, in a form that scipy names but does not write."""
+    import scipy.io
+
+    def element(kind, content):
+        return struct.pack("<II", kind, len(content)) + content + bytes(-len(content) % 8)
+
+    name = "table.mat"
+    scipy.io.savemat(OUT / name, {"speed": np.arange(20.0)})
+    flags = lambda code: element(6, struct.pack("<II", code, 0))
+    inner = element(14, flags(13) + element(5, struct.pack("<ii", 1, 6)) + element(1, b"") + element(6, struct.pack("<6I", 0xDD000000, 2, 1, 1, 1, 1)))
+    opaque = element(14, flags(17) + element(1, b"readings") + element(1, b"MCOS") + element(1, b"table") + inner)
+    with open(OUT / name, "ab") as file:
+        file.write(opaque)
+    assert [type(one).__name__ for one in scipy.io.loadmat(OUT / name).values()].count("MatlabOpaque") == 1
+    expect(name, [("", "speed", np.arange(20.0), None, "", [])], refused=["readings"])
+
+
 def hdf5():
     import h5py
 
@@ -339,11 +412,45 @@ def hdf5():
         file.write(b"MATLAB 7.3 MAT-file, Platform: GLNXA64".ljust(124) + struct.pack("<H", 0x0200) + b"IM")
     expect(name, channels)
 
-    name = "lzf.h5"
+    # LZF packs whole runs, little, and not at all; a chunk that does not shrink is left as it is.
+    name = "h5py-lzf.h5"
+    channels = []
     with h5py.File(OUT / name, "w") as file:
-        file.create_dataset("x", data=np.arange(1000.0), compression="lzf", chunks=(100,))
+        for key, values in [("steps", np.arange(5000.0) // 700), ("ramp", np.arange(5000.0)), ("noise", RNG.normal(size=5000)),
+                            ("counts", (RNG.normal(size=5000) * 3).astype("<i2")), ("same", np.zeros(5000, "<f4"))]:
+            for shuffle in [False, True]:
+                path = f"{key}{int(shuffle)}"
+                file.create_dataset(path, data=values, compression="lzf", shuffle=shuffle, chunks=(1100,))
+                channels.append(("", path, values, None, "", []))
+    expect(name, channels)
+
+    # A filter that is not there: the number of one that is registered by others, marked as optional so that h5py writes without it.
+    name = "filter.h5"
+    with h5py.File(OUT / name, "w") as file:
+        kind = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
+        kind.set_chunk((100,))
+        kind.set_shuffle()
         file["y"] = np.arange(10.0)
+        h5py.h5d.create(file.id, b"x", h5py.h5t.NATIVE_DOUBLE, h5py.h5s.create_simple((1000,)), dcpl=kind).write(
+            h5py.h5s.ALL, h5py.h5s.ALL, np.arange(1000.0))
+    whole = (OUT / name).read_bytes()
+    # The filter's number in the header of the data set, in place of the one of shuffle.
+    at = whole.index(b"shuffle\0") - 8
+    assert whole[at:at + 2] == b"\x02\x00"
+    (OUT / name).write_bytes(whole[:at] + struct.pack("<H", 32015) + whole[at + 2:])
     expect(name, [("", "y", np.arange(10.0), None, "", [])], refused=["x"])
+
+    # As MATLAB writes a table in v7.3: a reference to its parts, and the class as an attribute.
+    name = "v73-table.mat"
+    with h5py.File(OUT / name, "w", userblock_size=512) as file:
+        for kind in ["table", "timetable", "string"]:
+            data = file.create_dataset(kind, data=np.array([[0xDD000000, 2, 1, 1, 1, 1]], dtype="<u4"))
+            data.attrs["MATLAB_class"] = np.bytes_(kind)
+            data.attrs["MATLAB_object_decode"] = np.int32(3)
+        file.create_dataset("speed", data=np.arange(50.0).reshape(1, -1)).attrs["MATLAB_class"] = np.bytes_("double")
+    with open(OUT / name, "r+b") as file:
+        file.write(b"MATLAB 7.3 MAT-file, Platform: GLNXA64".ljust(124) + struct.pack("<H", 0x0200) + b"IM")
+    expect(name, [("", "speed", np.arange(50.0), None, "", [])], refused=["table", "timetable", "string"])
 
 
 def arrow():
@@ -448,6 +555,6 @@ def shipped():
 
 if __name__ == "__main__":
     OUT.mkdir(parents=True, exist_ok=True)
-    for step in [mdf, unsorted_mdf, tdms, mat, hdf5, arrow, csv, shipped]:
+    for step in [mdf, unsorted_mdf, tdms, mat, matlab_table, hdf5, arrow, csv, shipped]:
         step()
     print(f"{len(list(OUT.glob('*.json')))} files")

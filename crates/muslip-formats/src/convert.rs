@@ -6,6 +6,7 @@ use std::sync::Arc;
 
 use crate::error::{FormatError, Problem};
 use crate::format::Format;
+pub use crate::made::{Fault, Made, Resampled};
 use crate::map::{Entry, Map};
 use crate::raster::{self, Done};
 use crate::roles::{self, Assigned, Refused, Roles, TIME};
@@ -17,30 +18,6 @@ use crate::units::{self, Quantity};
 pub(crate) const MOST_GAPS: usize = 100;
 /// Most rows that a raster of `rate_hz` may have.
 const MOST_ROWS: f64 = 2e8;
-
-/// Something of a channel that a diagnosis must know.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Fault {
-    /// The column.
-    pub column: String,
-    /// From when, in s of the recording's time.
-    pub start_s: f64,
-    /// Until when.
-    pub end_s: f64,
-    /// What, in words.
-    pub what: String,
-}
-
-/// A column whose channel was measured at other times than the recording's.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Resampled {
-    /// The column.
-    pub column: String,
-    /// The channel's own sampling interval in s.
-    pub interval_s: f64,
-    /// What was done to it.
-    pub done: Done,
-}
 
 /// A recording made of a file of another format.
 #[derive(Debug, Clone)]
@@ -55,10 +32,8 @@ pub struct Converted {
     pub columns: Vec<Vec<f64>>,
     /// What was read, converted, interpolated, decimated or dropped, one line each.
     pub notes: Vec<String>,
-    /// What of it a diagnosis must know.
-    pub faults: Vec<Fault>,
-    /// Which columns were measured at other times.
-    pub resampled: Vec<Resampled>,
+    /// What of it a diagnosis must know, also of a conversion that this file came from.
+    pub made: Made,
     /// Columns of the contract that no channel became, and why.
     pub refused: Vec<Refused>,
     /// The roles as they were found, as a map.
@@ -109,8 +84,7 @@ pub fn convert(file: &mut SourceFile, map: Option<&Map>) -> Result<Converted, Fo
         names: vec![TIME.to_owned()],
         columns: vec![grid.iter().map(|time| time - start_s).collect()],
         notes: Vec::new(),
-        faults: Vec::new(),
-        resampled: Vec::new(),
+        made: Made::default(),
         refused: roles.refused.clone(),
         map: roles.as_map(&channels, &time),
         guessed: roles.guessed,
@@ -120,6 +94,8 @@ pub fn convert(file: &mut SourceFile, map: Option<&Map>) -> Result<Converted, Fo
     for one in ready {
         let (values, done) = raster::onto(&grid, &one.times, &one.values, one.one.entry.method);
         out.tell(&one, &values, done, &grid, start_s);
+        out.made
+            .inherit(file.made(), &one.channel.name, &one.one.column);
         out.names.push(one.one.column);
         out.columns.push(values);
     }
@@ -131,7 +107,7 @@ pub fn convert(file: &mut SourceFile, map: Option<&Map>) -> Result<Converted, Fo
     for fault in faults.into_iter().chain(file.faults()) {
         if told.insert(fault.clone()) {
             out.notes.push(format!("fault: {fault}"));
-            out.faults.push(Fault {
+            out.made.faults.push(Fault {
                 column: TIME.to_owned(),
                 start_s: from,
                 end_s: to,
@@ -139,6 +115,7 @@ pub fn convert(file: &mut SourceFile, map: Option<&Map>) -> Result<Converted, Fo
             });
         }
     }
+    out.made.inherit(file.made(), TIME, TIME);
     Ok(out)
 }
 
@@ -197,6 +174,14 @@ impl Prepared {
     pub(crate) fn units(&self) -> Result<Vec<(f64, f64, String)>, Problem> {
         let unit = |one: &Assigned| to_si(&self.channels[one.channel], &one.column, &one.entry);
         self.roles.assigned.iter().map(unit).collect()
+    }
+
+    /// The place of the column whose times the map wants.
+    pub(crate) fn raster_place(&self, name: &str) -> Result<usize, Problem> {
+        place_of(
+            name,
+            self.roles.assigned.iter().map(|one| one.column.as_str()),
+        )
     }
 
     /// How the file is read, in words.
@@ -264,25 +249,6 @@ pub(crate) fn bring(
     count
 }
 
-/// What was done to a column, in a line.
-pub(crate) fn column_note(
-    column: &str,
-    channel: &Channel,
-    unit: &str,
-    done: &str,
-    empty: u64,
-    invalid: u64,
-) -> String {
-    let mut note = format!("{column}: {}{unit}; {done}", channel.shown());
-    if empty > 0 {
-        note.push_str(&format!("; {empty} empty"));
-    }
-    if invalid > 0 {
-        note.push_str(&format!("; {invalid} readings invalid in the file"));
-    }
-    note
-}
-
 /// A column that no work requires and that was only guessed is left out where its unit does not do; answers with what was.
 fn drop_unusable(roles: &mut Roles, channels: &[Channel]) -> Vec<String> {
     let mut told = Vec::new();
@@ -304,87 +270,156 @@ fn drop_unusable(roles: &mut Roles, channels: &[Channel]) -> Vec<String> {
 
 impl Converted {
     fn tell(&mut self, one: &Ready, values: &[f64], done: Done, grid: &[f64], start_s: f64) {
-        let column = &one.one.column;
-        let rate = |times: &[f64]| {
-            raster::rate_hz(times).map_or("one reading".to_owned(), |rate| {
-                format!("{} Hz", rounded(rate))
-            })
+        let longest = raster::longest_step_s(&one.times);
+        let gaps = one.times.windows(2);
+        let gaps = gaps.filter(|pair| pair[1] - pair[0] > longest);
+        let ends = one.times.first().zip(one.times.last());
+        let told = Told {
+            column: &one.one.column,
+            channel: &one.channel,
+            unit: &one.unit,
+            done,
+            interval_s: raster::interval_s(&one.times),
+            rate_hz: raster::rate_hz(&one.times),
+            raster_hz: raster::rate_hz(grid),
+            ends: ends.map(|(first, last)| (first - start_s, last - start_s)),
+            gaps: gaps
+                .take(MOST_GAPS)
+                .map(|pair| (pair[0] - start_s, pair[1] - start_s))
+                .collect(),
+            empty: values.iter().filter(|value| value.is_nan()).count() as u64,
+            invalid: one.invalid,
         };
-        let (own, wanted) = (rate(&one.times), rate(grid));
-        let done_in_words = match done {
-            Done::Kept => format!("{own}, kept"),
+        told.tell(&mut self.notes, &mut self.made);
+    }
+}
+
+/// What became of a column: times in s of the recording.
+pub(crate) struct Told<'a> {
+    pub(crate) column: &'a str,
+    pub(crate) channel: &'a Channel,
+    /// Its conversion to SI in words.
+    pub(crate) unit: &'a str,
+    pub(crate) done: Done,
+    /// Its own median interval.
+    pub(crate) interval_s: Option<f64>,
+    pub(crate) rate_hz: Option<f64>,
+    pub(crate) raster_hz: Option<f64>,
+    /// Its first and last reading.
+    pub(crate) ends: Option<(f64, f64)>,
+    pub(crate) gaps: Vec<(f64, f64)>,
+    pub(crate) empty: u64,
+    pub(crate) invalid: u64,
+}
+
+impl Told<'_> {
+    /// Says it in a line of words, and to a diagnosis.
+    pub(crate) fn tell(&self, notes: &mut Vec<String>, made: &mut Made) {
+        let (own, wanted) = (rate_words(self.rate_hz), rate_words(self.raster_hz));
+        let (in_short, in_full) = match self.done {
+            Done::Kept => (format!("{own}, kept"), None),
             Done::Interpolated(method) => {
-                format!("{own}, brought onto {wanted} ({})", method.word())
+                let word = method.word();
+                let what = format!(
+                    "measured at {own}, interpolated ({word}) onto {wanted}: no more is known of it than its own readings"
+                );
+                (format!("{own}, brought onto {wanted} ({word})"), Some(what))
             }
-            Done::Decimated { .. } => format!("{own}, low-passed and decimated to {wanted}"),
+            Done::Decimated { .. } => {
+                let what = format!(
+                    "measured at {own}, low-passed without delay and decimated to {wanted}"
+                );
+                (
+                    format!("{own}, low-passed and decimated to {wanted}"),
+                    Some(what),
+                )
+            }
         };
-        let empty = values.iter().filter(|value| value.is_nan()).count() as u64;
-        self.notes.push(column_note(
-            column,
-            &one.channel,
-            &one.unit,
-            &done_in_words,
-            empty,
-            one.invalid,
-        ));
-        let (Some(first), Some(last)) = (one.times.first(), one.times.last()) else {
+        let mut note = format!(
+            "{}: {}{}; {in_short}",
+            self.column,
+            self.channel.shown(),
+            self.unit
+        );
+        if self.empty > 0 {
+            note.push_str(&format!("; {} empty", self.empty));
+        }
+        if self.invalid > 0 {
+            note.push_str(&format!("; {} readings invalid in the file", self.invalid));
+        }
+        notes.push(note);
+        let Some((first_s, last_s)) = self.ends else {
             return;
         };
-        if let Some(interval_s) = raster::interval_s(&one.times).filter(|_| done != Done::Kept) {
-            self.resampled.push(Resampled {
-                column: column.clone(),
+        if let Some(interval_s) = self.interval_s.filter(|_| self.done != Done::Kept) {
+            made.resampled.push(Resampled {
+                column: self.column.to_owned(),
                 interval_s,
-                done,
+                done: self.done,
             });
         }
-        let mut fault = |start: f64, end: f64, what: String| {
-            self.faults.push(Fault {
-                column: column.clone(),
-                start_s: start - start_s,
-                end_s: end - start_s,
+        let mut fault = |start_s: f64, end_s: f64, what: String| {
+            made.faults.push(Fault {
+                column: self.column.to_owned(),
+                start_s,
+                end_s,
                 what,
             });
         };
-        match done {
-            Done::Kept => {}
-            Done::Interpolated(method) => fault(
-                *first,
-                *last,
-                format!(
-                    "measured at {own}, interpolated ({}) onto {wanted}: no more is known of it than its own readings",
-                    method.word()
-                ),
-            ),
-            Done::Decimated { .. } => fault(
-                *first,
-                *last,
-                format!("measured at {own}, low-passed without delay and decimated to {wanted}"),
-            ),
+        if let Some(what) = in_full {
+            fault(first_s, last_s, what);
         }
-        let longest = raster::longest_step_s(&one.times);
-        for pair in one
-            .times
-            .windows(2)
-            .filter(|pair| pair[1] - pair[0] > longest)
-            .take(MOST_GAPS)
-        {
-            fault(
-                pair[0],
-                pair[1],
-                format!("gap of {} s", rounded(pair[1] - pair[0])),
-            );
+        for &(from, to) in &self.gaps {
+            fault(from, to, format!("gap of {} s", rounded(to - from)));
         }
-        if one.invalid > 0 {
-            fault(
-                *first,
-                *last,
-                format!(
-                    "{} readings are invalid in the file: left empty",
-                    one.invalid
-                ),
+        if self.invalid > 0 {
+            let what = format!(
+                "{} readings are invalid in the file: left empty",
+                self.invalid
             );
+            fault(first_s, last_s, what);
         }
     }
+}
+
+/// A rate in words.
+fn rate_words(rate_hz: Option<f64>) -> String {
+    rate_hz.map_or("one reading".to_owned(), |rate| {
+        format!("{} Hz", rounded(rate))
+    })
+}
+
+/// Whose times the raster keeps, in words.
+pub(crate) fn raster_words(column: &str, rate_hz: Option<f64>) -> String {
+    format!("times of {column}, {}", rate_words(rate_hz))
+}
+
+/// The same of a raster of a rate.
+pub(crate) fn even_words(column: &str, rate_hz: f64) -> String {
+    format!("{rate_hz} Hz from the first to the last reading of {column}")
+}
+
+/// A conversion to SI in words, with what the map says of the channel's delay.
+pub(crate) fn unit_words(unit: &str, entry: &Entry) -> String {
+    if entry.delay_s == 0.0 {
+        return unit.to_owned();
+    }
+    format!("{unit}, {} s of delay taken out", entry.delay_s)
+}
+
+/// Start and number of the rows of a raster of a rate, between the first and the last of its channel's times.
+pub(crate) fn even_rows(ends: Option<(f64, f64)>, rate_hz: f64) -> Result<(f64, usize), Problem> {
+    let Some((first, last)) = ends else {
+        return Err(Problem::whole("the raster's channel has no readings"));
+    };
+    let rows = ((last - first) * rate_hz + 1e-6).floor() + 1.0;
+    if rows.is_nan() || rows > MOST_ROWS {
+        return Err(Problem::whole(format!(
+            "{rate_hz} Hz over {} s are more rows than {MOST_ROWS:e}",
+            last - first
+        )));
+    }
+    Ok((first, rows as usize))
 }
 
 /// Three digits behind the point at most.
@@ -442,10 +477,7 @@ fn read(
         } else {
             Arc::new(stamps.iter().map(|time| time - one.entry.delay_s).collect())
         };
-        let mut unit = unit;
-        if one.entry.delay_s != 0.0 {
-            unit.push_str(&format!(", {} s of delay taken out", one.entry.delay_s));
-        }
+        let unit = unit_words(&unit, &one.entry);
         ready.push(Ready {
             one: one.clone(),
             channel: channel.clone(),
@@ -679,54 +711,43 @@ fn to_si(channel: &Channel, column: &str, entry: &Entry) -> Result<(f64, f64, St
 fn grid(ready: &[Ready], time: &crate::map::Time) -> Result<(Arc<Vec<f64>>, String), Problem> {
     let rate = |one: &Ready| raster::rate_hz(&one.times).unwrap_or(0.0);
     let chosen = match &time.raster {
-        Some(name) => ready
-            .iter()
-            .find(|one| &one.one.column == name)
-            .ok_or_else(|| {
-                let columns: Vec<&str> = ready.iter().map(|one| one.one.column.as_str()).collect();
-                Problem::whole(format!(
-                    "time.raster = {name:?}: no such column; there are {}",
-                    columns.join(", ")
-                ))
-            })?,
+        Some(name) => {
+            let columns = ready.iter().map(|one| one.one.column.as_str());
+            ready.get(place_of(name, columns)?)
+        }
         // The first of equals, so that the order of the contract decides and not a rounding.
-        None => ready
-            .iter()
-            .reduce(|best, one| {
-                if rate(one) > rate(best) * (1.0 + 1e-6) {
-                    one
-                } else {
-                    best
-                }
-            })
-            .ok_or_else(|| Problem::whole("no channel"))?,
+        None => ready.iter().reduce(|best, one| {
+            if rate(one) > rate(best) * (1.0 + 1e-6) {
+                one
+            } else {
+                best
+            }
+        }),
     };
+    let chosen = chosen.ok_or_else(|| Problem::whole("no channel"))?;
+    let column = &chosen.one.column;
     let Some(rate_hz) = time.rate_hz else {
-        let words = format!(
-            "times of {}, {} Hz",
-            chosen.one.column,
-            rounded(rate(chosen))
-        );
+        let words = raster_words(column, raster::rate_hz(&chosen.times));
         return Ok((Arc::clone(&chosen.times), words));
     };
-    let (Some(first), Some(last)) = (chosen.times.first(), chosen.times.last()) else {
-        return Err(Problem::whole("the raster's channel has no readings"));
-    };
-    let rows = ((last - first) * rate_hz + 1e-6).floor() + 1.0;
-    if rows.is_nan() || rows > MOST_ROWS {
-        return Err(Problem::whole(format!(
-            "{rate_hz} Hz over {} s are more rows than {MOST_ROWS:e}",
-            last - first
-        )));
-    }
-    let times = (0..rows as usize)
-        .map(|k| first + k as f64 / rate_hz)
-        .collect();
-    Ok((
-        Arc::new(times),
-        format!(
-            "{rate_hz} Hz from the first to the last reading of {}",
-            chosen.one.column
-        ),
-    ))
+    let ends = chosen
+        .times
+        .first()
+        .copied()
+        .zip(chosen.times.last().copied());
+    let (first, rows) = even_rows(ends, rate_hz)?;
+    let times = (0..rows).map(|k| first + k as f64 / rate_hz).collect();
+    Ok((Arc::new(times), even_words(column, rate_hz)))
+}
+
+/// The place of the column whose times a map wants.
+fn place_of<'a>(name: &str, columns: impl Iterator<Item = &'a str>) -> Result<usize, Problem> {
+    let columns: Vec<&str> = columns.collect();
+    let place = columns.iter().position(|column| *column == name);
+    place.ok_or_else(|| {
+        Problem::whole(format!(
+            "time.raster = {name:?}: no such column; there are {}",
+            columns.join(", ")
+        ))
+    })
 }

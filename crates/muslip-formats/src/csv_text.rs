@@ -1,13 +1,15 @@
 //! CSV of any dialect: delimiter, decimal mark, encoding, preamble and unit row are found from the text.
 
+use std::borrow::Cow;
 use std::fs::File;
-use std::io::{BufRead, BufReader, Read, Seek, SeekFrom};
+use std::io::{Read, Seek, SeekFrom};
 
 use encoding_rs::Encoding;
 use encoding_rs_io::{DecodeReaderBytes, DecodeReaderBytesBuilder};
 
 use crate::error::{Place, Problem};
 use crate::file_bytes::FileBytes;
+use crate::made::{COMMENT_BYTES, Made};
 use crate::source::{Channel, Kind, Pieces, Series, Source};
 use crate::time_text::stamp;
 use crate::units;
@@ -19,7 +21,9 @@ const HEAD_LINES: usize = 400;
 /// Rows of a piece.
 const ROWS_A_PIECE: usize = 1 << 16;
 /// Longest line, in bytes: what has longer ones is no table.
-const LONGEST_LINE: u64 = 1 << 24;
+const LONGEST_LINE: usize = 1 << 24;
+/// Bytes of the text that are fetched at a time.
+const PIECE_BYTES: usize = 1 << 18;
 
 /// A text file with a delimiter.
 pub(crate) struct CsvSource {
@@ -29,6 +33,7 @@ pub(crate) struct CsvSource {
     channels: Vec<Channel>,
     /// How each column is read.
     cells: Vec<Cells>,
+    made: Made,
     faults: Vec<String>,
 }
 
@@ -86,6 +91,7 @@ impl CsvSource {
             encoding,
             channels: Vec::new(),
             cells,
+            made: made_of(&bytes)?,
             faults: Vec::new(),
             layout,
         };
@@ -119,13 +125,7 @@ impl CsvSource {
 
     /// The rows' lines, from the first row of data.
     fn lines(&self) -> Result<Lines, Problem> {
-        let mut file = &self.file;
-        file.seek(SeekFrom::Start(0))?;
-        let mut lines = Lines {
-            text: Text::new(self.encoding, self.file.try_clone()?),
-            line: String::new(),
-            number: 0,
-        };
+        let mut lines = Lines::new(Text::new(self.encoding, self.file.try_clone()?));
         while lines.number < self.layout.skip_lines && lines.next()? {}
         Ok(lines)
     }
@@ -135,11 +135,12 @@ impl CsvSource {
         let mut lines = self.lines()?;
         let mut rows = 0;
         while lines.next()? {
-            if is_blank(&lines.line) {
+            let line = lines.line();
+            if !is_filled(line) && is_blank(&String::from_utf8_lossy(line)) {
                 continue;
             }
             rows += 1;
-            let found = cell_count(&lines.line, self.layout.delimiter);
+            let found = cell_count(line, self.layout.delimiter);
             if found != self.layout.columns && self.faults.len() < 10 {
                 self.faults.push(format!(
                     "line {}: {found} cells where the header has {}",
@@ -166,6 +167,8 @@ impl CsvSource {
             source: self,
             lines: self.lines()?,
             wanted: wanted.to_vec(),
+            plain: PlainRows::of(&self.layout, &self.cells, wanted),
+            row: Vec::with_capacity(wanted.len()),
             first_stamp: None,
             spans: Vec::new(),
         })
@@ -177,6 +180,10 @@ struct Rows<'a> {
     source: &'a CsvSource,
     lines: Lines,
     wanted: Vec<usize>,
+    /// How rows of nothing but plain numbers are read.
+    plain: Option<PlainRows>,
+    /// Values of such a row.
+    row: Vec<f64>,
     /// Second of the first time stamp: the others count from there.
     first_stamp: Option<i64>,
     spans: Vec<(usize, usize)>,
@@ -185,54 +192,233 @@ struct Rows<'a> {
 impl Rows<'_> {
     /// Appends so many rows at most to the columns; false at the end of the text.
     fn read(&mut self, most: usize, columns: &mut [Vec<f64>]) -> Result<bool, Problem> {
-        let CsvSource { layout, cells, .. } = self.source;
         let mut rows = 0;
         while rows < most {
-            if !self.lines.next()? {
+            if !self.lines.fill()? {
                 return Ok(false);
             }
-            let line = self.lines.line.as_str();
-            if is_blank(line) {
+            if let Some(plain) = &self.plain
+                && let Some(used) = plain.row(self.lines.ahead(), &mut self.row)
+            {
+                self.lines.pass(used);
+                for (&value, &target) in self.row.iter().zip(&plain.targets) {
+                    columns[target].push(value);
+                }
+                rows += 1;
                 continue;
             }
-            rows += 1;
-            spans(line, layout.delimiter, &mut self.spans);
-            if self.spans.len() != layout.columns {
-                let cell = self.spans.len().min(layout.columns);
-                let at = self.spans.get(cell).map_or(line.len(), |span| span.0);
-                return Err(Problem {
-                    place: self.lines.place(at),
-                    reason: format!(
-                        "{} cells where the header has {}",
-                        self.spans.len(),
-                        layout.columns
-                    ),
-                });
-            }
-            for (&column, values) in self.wanted.iter().zip(&mut *columns) {
-                let (from, to) = self.spans[column];
-                let cell = unquoted(&line[from..to]);
-                let value = match cells[column] {
-                    Cells::Stamps if is_missing(&cell) => Some(f64::NAN),
-                    Cells::Stamps => stamp(&cell).map(|(second, fraction)| {
-                        let first = *self.first_stamp.get_or_insert(second);
-                        (second - first) as f64 + fraction
-                    }),
-                    Cells::Truths => truth(&cell).or_else(|| number(&cell, layout.decimal_comma)),
-                    Cells::Numbers | Cells::Text => number(&cell, layout.decimal_comma),
-                };
-                let Some(value) = value else {
-                    let shown: String = cell.chars().take(40).collect();
-                    return Err(Problem {
-                        place: self.lines.place(from),
-                        reason: format!("{}: {shown:?} is not a number", layout.names[column]),
-                    });
-                };
-                values.push(value);
-            }
+            rows += usize::from(self.any_row(columns)?);
         }
         Ok(true)
     }
+
+    /// Appends the next line's cells, whatever they are; false where it is no row.
+    fn any_row(&mut self, columns: &mut [Vec<f64>]) -> Result<bool, Problem> {
+        let CsvSource { layout, cells, .. } = self.source;
+        if !self.lines.next()? {
+            return Ok(false);
+        }
+        // As a decoder does: what is no character is marked as such.
+        let line = String::from_utf8_lossy(self.lines.line());
+        let line = line.as_ref();
+        if is_blank(line) {
+            return Ok(false);
+        }
+        spans(line, layout.delimiter, &mut self.spans);
+        if self.spans.len() != layout.columns {
+            let cell = self.spans.len().min(layout.columns);
+            let at = self.spans.get(cell).map_or(line.len(), |span| span.0);
+            return Err(Problem {
+                place: place(self.lines.number, line, at),
+                reason: format!(
+                    "{} cells where the header has {}",
+                    self.spans.len(),
+                    layout.columns
+                ),
+            });
+        }
+        for (&column, values) in self.wanted.iter().zip(&mut *columns) {
+            let (from, to) = self.spans[column];
+            let cell = unquoted(&line[from..to]);
+            let value = match cells[column] {
+                Cells::Stamps if is_missing(&cell) => Some(f64::NAN),
+                Cells::Stamps => stamp(&cell).map(|(second, fraction)| {
+                    let first = *self.first_stamp.get_or_insert(second);
+                    (second - first) as f64 + fraction
+                }),
+                Cells::Truths => truth(&cell).or_else(|| number(&cell, layout.decimal_comma)),
+                Cells::Numbers | Cells::Text => number(&cell, layout.decimal_comma),
+            };
+            let Some(value) = value else {
+                let shown: String = cell.chars().take(40).collect();
+                return Err(Problem {
+                    place: place(self.lines.number, line, from),
+                    reason: format!("{}: {shown:?} is not a number", layout.names[column]),
+                });
+            };
+            values.push(value);
+        }
+        Ok(true)
+    }
+}
+
+/// Rows that are read straight from the bytes: those whose wanted cells are plain numbers or empty, without quotes. Nearly all rows are such; every
+/// other one is left to the way that tells what is wrong with it.
+struct PlainRows {
+    delimiter: u8,
+    point: u8,
+    /// Of each column, whether it is wanted.
+    wanted: Vec<bool>,
+    /// Of each wanted column, in the order of the file, its place among those that were asked for.
+    targets: Vec<usize>,
+}
+
+impl PlainRows {
+    fn of(layout: &Layout, cells: &[Cells], wanted: &[usize]) -> Option<Self> {
+        let delimiter = layout.delimiter? as u32 as u8;
+        let point = if layout.decimal_comma { b',' } else { b'.' };
+        let mut targets: Vec<usize> = (0..wanted.len()).collect();
+        targets.sort_by_key(|&target| wanted[target]);
+        let is_once = targets
+            .windows(2)
+            .all(|pair| wanted[pair[0]] != wanted[pair[1]]);
+        let are_numbers = wanted.iter().all(|&column| cells[column] == Cells::Numbers);
+        (delimiter != point && is_once && are_numbers).then(|| Self {
+            delimiter,
+            point,
+            wanted: (0..layout.columns)
+                .map(|column| wanted.contains(&column))
+                .collect(),
+            targets,
+        })
+    }
+
+    /// The wanted numbers of the first line of a text that ends with a line's end; answers with the line's bytes, its end included.
+    fn row(&self, text: &[u8], row: &mut Vec<f64>) -> Option<usize> {
+        if !is_filled(text) {
+            return None;
+        }
+        row.clear();
+        let (last, others) = self.wanted.split_last()?;
+        let mut at = 0;
+        for &wanted in others {
+            at = self.cell(text, at, wanted, row)?;
+            if *text.get(at)? != self.delimiter {
+                return None;
+            }
+            at += 1;
+        }
+        at = self.cell(text, at, *last, row)?;
+        match text.get(at)? {
+            b'\n' => Some(at + 1),
+            b'\r' if text.get(at + 1) == Some(&b'\n') => Some(at + 2),
+            _ => None,
+        }
+    }
+
+    /// Goes over a cell: answers with the byte behind it.
+    fn cell(&self, text: &[u8], at: usize, wanted: bool, row: &mut Vec<f64>) -> Option<usize> {
+        if wanted {
+            let (value, end) = plain_number(text, at, self.point, self.delimiter)?;
+            row.push(value);
+            return Some(end);
+        }
+        let ends = |byte: &u8| *byte == self.delimiter || matches!(byte, b'\n' | b'\r' | b'"');
+        Some(at + text.get(at..)?.iter().position(ends)?)
+    }
+}
+
+/// A number without blanks inside it, and the byte behind it and the blanks around it; `NaN` where there are blanks only.
+fn plain_number(text: &[u8], mut at: usize, point: u8, delimiter: u8) -> Option<(f64, usize)> {
+    let blanks = |mut at: usize| {
+        while text.get(at) == Some(&b' ') {
+            at += 1;
+        }
+        at
+    };
+    at = blanks(at);
+    let start = at;
+    let sign = *text.get(at)?;
+    if sign == delimiter || matches!(sign, b'\n' | b'\r') {
+        return Some((f64::NAN, at));
+    }
+    at += usize::from(matches!(sign, b'-' | b'+'));
+    let mut digits = 0_u64;
+    let mut run = |mut at: usize| {
+        while let Some(digit) = text.get(at).map(|byte| byte.wrapping_sub(b'0'))
+            && digit < 10
+        {
+            digits = digits.wrapping_mul(10).wrapping_add(u64::from(digit));
+            at += 1;
+        }
+        at
+    };
+    let whole = at;
+    at = run(at);
+    let mut count = at - whole;
+    let mut exponent = 0;
+    if *text.get(at)? == point {
+        let decimals = at + 1;
+        at = run(decimals);
+        count += at - decimals;
+        exponent = -i32::try_from(at - decimals).ok()?;
+    }
+    if count == 0 {
+        return None;
+    }
+    if *text.get(at)? | 0x20 == b'e' {
+        at += 1;
+        let sign = *text.get(at)?;
+        at += usize::from(matches!(sign, b'-' | b'+'));
+        let from = at;
+        let mut power = 0;
+        while let Some(digit) = text.get(at).map(|byte| byte.wrapping_sub(b'0'))
+            && digit < 10
+        {
+            power = 10 * power + i32::from(digit);
+            at += 1;
+            if at - from > 4 {
+                return None;
+            }
+        }
+        if at == from {
+            return None;
+        }
+        exponent += if sign == b'-' { -power } else { power };
+    }
+    // Digits and power of ten are exact numbers of their own then, and one operation rounds once.
+    let is_exact = count <= 19 && digits <= 1 << 53;
+    let power = POWERS.get(exponent.unsigned_abs() as usize);
+    let value = match power.filter(|_| is_exact) {
+        Some(power) => {
+            let digits = digits as f64;
+            let size = if exponent < 0 {
+                digits / power
+            } else {
+                digits * power
+            };
+            if sign == b'-' { -size } else { size }
+        }
+        None => {
+            let cell = str::from_utf8(text.get(start..at)?).ok()?;
+            number(cell, point == b',')?
+        }
+    };
+    Some((value, blanks(at)))
+}
+
+/// The powers of ten that are exact.
+const POWERS: [f64; 23] = [
+    1e0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9, 1e10, 1e11, 1e12, 1e13, 1e14, 1e15, 1e16,
+    1e17, 1e18, 1e19, 1e20, 1e21, 1e22,
+];
+
+/// What the comments say of a conversion that the text came from.
+fn made_of(bytes: &FileBytes) -> Result<Made, Problem> {
+    let length = bytes.length();
+    let first = bytes.up_to(0, COMMENT_BYTES)?;
+    let last = bytes.up_to(length.saturating_sub(COMMENT_BYTES), COMMENT_BYTES)?;
+    Ok(Made::of_text(&first, &last, length <= COMMENT_BYTES))
 }
 
 /// Columns as series.
@@ -251,6 +437,10 @@ impl Source for CsvSource {
 
     fn channels(&self) -> &[Channel] {
         &self.channels
+    }
+
+    fn made(&self) -> Made {
+        self.made.clone()
     }
 
     fn read(&mut self, wanted: &[usize]) -> Result<Vec<Series>, Problem> {
@@ -284,78 +474,162 @@ impl Source for CsvSource {
     }
 }
 
-/// A file as text.
+/// A file from its beginning, wherever others read the same one.
+struct FromStart {
+    file: File,
+    at: u64,
+}
+
+impl Read for FromStart {
+    fn read(&mut self, bytes: &mut [u8]) -> std::io::Result<usize> {
+        self.file.seek(SeekFrom::Start(self.at))?;
+        let read = self.file.read(bytes)?;
+        self.at += read as u64;
+        Ok(read)
+    }
+}
+
+/// A file as text in UTF-8, but for bytes that are no characters.
 enum Text {
     /// As it lies there.
-    Utf8(BufReader<File>),
+    Utf8(FromStart),
     /// Recoded.
-    Other(BufReader<DecodeReaderBytes<File, Vec<u8>>>),
+    Other(Box<DecodeReaderBytes<FromStart, Vec<u8>>>),
 }
 
 impl Text {
     fn new(encoding: &'static Encoding, file: File) -> Self {
+        let file = FromStart { file, at: 0 };
         if encoding == encoding_rs::UTF_8 {
-            return Self::Utf8(BufReader::with_capacity(1 << 16, file));
+            return Self::Utf8(file);
         }
-        Self::Other(BufReader::with_capacity(1 << 16, decoder(encoding, file)))
+        Self::Other(Box::new(decoder(encoding, file)))
     }
 
-    /// Appends the next line to an empty one, with its end; answers with its bytes in this encoding.
-    fn next(&mut self, line: &mut String) -> Result<u64, Problem> {
-        let read = match self {
-            Self::Utf8(text) => {
-                let mut bytes = std::mem::take(line).into_bytes();
-                let read = text.take(LONGEST_LINE).read_until(b'\n', &mut bytes)?;
-                *line = match String::from_utf8(bytes) {
-                    Ok(line) => line,
-                    // As a decoder does: what is no character is marked as such.
-                    Err(error) => String::from_utf8_lossy(error.as_bytes()).into_owned(),
-                };
-                read
-            }
-            Self::Other(text) => text.take(LONGEST_LINE).read_line(line)?,
-        };
-        Ok(read as u64)
+    fn read(&mut self, bytes: &mut [u8]) -> std::io::Result<usize> {
+        match self {
+            Self::Utf8(file) => file.read(bytes),
+            Self::Other(file) => file.read(bytes),
+        }
     }
 }
 
-/// The text line by line, each with its number.
+/// The text line by line, each with its number; none is copied.
 struct Lines {
     text: Text,
-    line: String,
+    /// A piece of the text.
+    buffer: Vec<u8>,
+    /// Where in it what was not gone through begins, its last whole line ends, and the text so far.
+    from: usize,
+    whole: usize,
+    filled: usize,
+    ended: bool,
+    /// The line that was gone to, without its end.
+    line: std::ops::Range<usize>,
     number: u64,
 }
 
 impl Lines {
-    /// Goes to the next line; false at the end.
-    fn next(&mut self) -> Result<bool, Problem> {
-        self.line.clear();
-        let read = self.text.next(&mut self.line)?;
-        if read == LONGEST_LINE {
-            return Err(Problem {
-                place: Place::Text {
-                    line: self.number + 1,
-                    column: 1,
-                },
-                reason: format!("a line of over {LONGEST_LINE} bytes: not a table"),
-            });
+    fn new(text: Text) -> Self {
+        Self {
+            text,
+            buffer: vec![0; PIECE_BYTES],
+            from: 0,
+            whole: 0,
+            filled: 0,
+            ended: false,
+            line: 0..0,
+            number: 0,
         }
-        while self.line.ends_with(['\n', '\r']) {
-            self.line.pop();
-        }
-        if self.number == 0 && self.line.starts_with('\u{feff}') {
-            self.line.remove(0);
-        }
-        self.number += 1;
-        Ok(read > 0)
     }
 
-    fn place(&self, byte: usize) -> Place {
-        let before = self.line.get(..byte).unwrap_or_default();
-        Place::Text {
-            line: self.number,
-            column: before.chars().count() as u64 + 1,
+    /// Sees to it that there is a whole line ahead; false at the end.
+    fn fill(&mut self) -> Result<bool, Problem> {
+        while self.from == self.whole {
+            self.buffer.copy_within(self.from..self.filled, 0);
+            self.filled -= self.from;
+            (self.from, self.whole, self.line) = (0, 0, 0..0);
+            if self.filled == self.buffer.len() {
+                if self.filled >= LONGEST_LINE {
+                    return Err(Problem {
+                        place: Place::Text {
+                            line: self.number + 1,
+                            column: 1,
+                        },
+                        reason: format!("a line of over {LONGEST_LINE} bytes: not a table"),
+                    });
+                }
+                self.buffer.resize(2 * self.filled, 0);
+            }
+            let Some(free) = self.buffer.get_mut(self.filled..) else {
+                return Ok(false);
+            };
+            let read = match self.text.read(free) {
+                Err(error) if error.kind() == std::io::ErrorKind::Interrupted => continue,
+                read => read?,
+            };
+            if read == 0 && (self.ended || self.filled == 0) {
+                return Ok(false);
+            }
+            let mut end = self.filled + read;
+            if read == 0 {
+                // The last line may have no end of its own.
+                self.ended = true;
+                self.buffer[end] = b'\n';
+                end += 1;
+            }
+            if let Some(last) = memchr::memrchr(b'\n', &self.buffer[self.filled..end]) {
+                self.whole = self.filled + last + 1;
+            }
+            self.filled = end;
         }
+        Ok(true)
+    }
+
+    /// The whole lines ahead.
+    fn ahead(&self) -> &[u8] {
+        &self.buffer[self.from..self.whole]
+    }
+
+    /// Leaves so many bytes behind, which are one line.
+    fn pass(&mut self, bytes: usize) {
+        self.from += bytes;
+        self.number += 1;
+    }
+
+    /// Goes to the next line; false at the end.
+    fn next(&mut self) -> Result<bool, Problem> {
+        if !self.fill()? {
+            return Ok(false);
+        }
+        let mut start = self.from;
+        let ahead = self.ahead();
+        let mut length = memchr::memchr(b'\n', ahead).unwrap_or(ahead.len());
+        self.from = (start + length + 1).min(self.whole);
+        while length > 0 && matches!(self.buffer[start + length - 1], b'\n' | b'\r') {
+            length -= 1;
+        }
+        let end = start + length;
+        if self.number == 0 && self.buffer[start..end].starts_with("\u{feff}".as_bytes()) {
+            start += "\u{feff}".len();
+        }
+        self.line = start..end;
+        self.number += 1;
+        Ok(true)
+    }
+
+    /// The line that was gone to.
+    fn line(&self) -> &[u8] {
+        &self.buffer[self.line.clone()]
+    }
+}
+
+/// Where a byte of a line is, as a line and a character.
+fn place(number: u64, line: &str, byte: usize) -> Place {
+    let before = line.get(..byte).unwrap_or_default();
+    Place::Text {
+        line: number,
+        column: before.chars().count() as u64 + 1,
     }
 }
 
@@ -425,15 +699,26 @@ fn spans(line: &str, delimiter: Option<char>, spans: &mut Vec<(usize, usize)>) {
     spans.push((from, line.len()));
 }
 
-fn cell_count(line: &str, delimiter: Option<char>) -> usize {
-    if let Some(delimiter) = delimiter
-        && !line.as_bytes().contains(&b'"')
-    {
+/// Whether a line begins with a character that tells it from comments and empty lines at once.
+fn is_filled(line: &[u8]) -> bool {
+    let first = line.first().copied().unwrap_or(b' ');
+    first.is_ascii_graphic() && !matches!(first, b'#' | b',' | b';' | b'|')
+}
+
+fn cell_count(line: &[u8], delimiter: Option<char>) -> usize {
+    if let Some(delimiter) = delimiter {
         let delimiter = delimiter as u32 as u8;
-        return 1 + line.bytes().filter(|&byte| byte == delimiter).count();
+        let (mut cells, mut quotes) = (1, 0);
+        for &byte in line {
+            cells += usize::from(byte == delimiter);
+            quotes += usize::from(byte == b'"');
+        }
+        if quotes == 0 {
+            return cells;
+        }
     }
     let mut all = Vec::new();
-    spans(line, delimiter, &mut all);
+    spans(&String::from_utf8_lossy(line), delimiter, &mut all);
     all.len()
 }
 
@@ -446,7 +731,7 @@ fn split(line: &str, delimiter: Option<char>) -> Vec<String> {
 }
 
 /// A cell without blanks and quotes around it.
-fn unquoted(cell: &str) -> std::borrow::Cow<'_, str> {
+fn unquoted(cell: &str) -> Cow<'_, str> {
     let cell = cell.trim();
     match cell
         .strip_prefix('"')
@@ -777,6 +1062,174 @@ mod tests {
     fn time_stamps_keep_their_digits() {
         let (_, values) = read(b"when,v\n2026-03-04 09:15:00.001,1\n2026-03-04 09:15:00.002,2\n");
         assert_eq!(values[0], [0.001, 0.002]);
+    }
+
+    /// Numbers without a pattern that matters here (Marsaglia's xorshift64).
+    fn dice(state: &mut u64, sides: usize) -> usize {
+        *state ^= *state << 13;
+        *state ^= *state >> 7;
+        *state ^= *state << 17;
+        (*state % sides as u64) as usize
+    }
+
+    #[test]
+    fn a_plain_number_is_the_one_that_the_library_reads_to_the_last_bit() {
+        let mut state = 0x2545_f491_4f6c_dd1d;
+        let words = [
+            "0",
+            "1",
+            "9",
+            "123",
+            "00",
+            "+",
+            "-",
+            ".",
+            ",",
+            "e",
+            "E",
+            "e-",
+            "e+",
+            "22",
+            "23",
+            "308",
+            "9007199254740993",
+            "18446744073709551616",
+            " ",
+            "inf",
+            "nan",
+            "x",
+            "_",
+        ];
+        let (mut plain, mut others) = (0, 0);
+        for k in 0..400_000 {
+            let cell: String = match k % 3 {
+                // Random bits as they are written, and short decimals.
+                0 => {
+                    let bits =
+                        (dice(&mut state, 1 << 32) as u64) << 32 | dice(&mut state, 1 << 32) as u64;
+                    format!("{:?}", f64::from_bits(bits))
+                }
+                1 => format!(
+                    "{}.{:04}",
+                    dice(&mut state, 5000) as i64 - 2500,
+                    dice(&mut state, 10_000)
+                ),
+                _ => (0..=dice(&mut state, 5))
+                    .map(|_| words[dice(&mut state, words.len())])
+                    .collect(),
+            };
+            for comma in [false, true] {
+                let cell = if comma {
+                    cell.replace('.', ",")
+                } else {
+                    cell.clone()
+                };
+                let text = format!("{cell};7\n");
+                let point = if comma { b',' } else { b'.' };
+                let Some((value, end)) = plain_number(text.as_bytes(), 0, point, b';') else {
+                    others += 1;
+                    continue;
+                };
+                // What is left of the cell sends the row the other way.
+                if text.as_bytes()[end] != b';' {
+                    continue;
+                }
+                plain += 1;
+                let expected = number(unquoted(&cell).as_ref(), comma).unwrap();
+                assert!(
+                    value.to_bits() == expected.to_bits() || (value.is_nan() && expected.is_nan()),
+                    "{cell:?}: {value:?} {expected:?}"
+                );
+            }
+        }
+        assert!(plain > 400_000 && others > 10_000, "{plain} {others}");
+    }
+
+    #[test]
+    fn rows_read_the_quick_way_are_those_read_the_other_way() {
+        let cells = [
+            "1",
+            "-2.5",
+            "+.5",
+            "5.",
+            "1e3",
+            "",
+            " ",
+            " 7 ",
+            "nan",
+            "inf",
+            "\"3\"",
+            "0.1234567890123456789012",
+            "1,5",
+            "--",
+            "1.234,5",
+            "123456789012345678901234567890",
+        ];
+        let mut state = 0x9e37_79b9_7f4a_7c15;
+        let mut both = 0;
+        for delimiter in [';', '\t', ',', '|'] {
+            for _ in 0..60 {
+                let mut text = format!("a{delimiter}b{delimiter}c{delimiter}d\n");
+                for _ in 0..40 {
+                    text.push_str(&format!("1{delimiter}2{delimiter}3{delimiter}x\r\n"));
+                }
+                for _ in 0..20 {
+                    let row: Vec<&str> = (0..3)
+                        .map(|_| cells[dice(&mut state, cells.len())])
+                        .collect();
+                    let row = row.join(&delimiter.to_string());
+                    text.push_str(&format!(
+                        "{row}{delimiter}{}\n",
+                        ["x", "ü", "\"y\"", ""][dice(&mut state, 4)]
+                    ));
+                    text.push_str(["", "# note\n", "\n", ";;\n"][dice(&mut state, 4)]);
+                }
+                let Ok(source) = source(text.as_bytes()) else {
+                    continue;
+                };
+                for wanted in [&[0, 1, 2][..], &[2, 0], &[1]] {
+                    let read = |is_quick: bool| {
+                        let mut rows = source.rows(wanted).unwrap();
+                        assert!(rows.plain.is_some() || source.layout.decimal_comma);
+                        rows.plain = rows.plain.filter(|_| is_quick);
+                        let mut columns = vec![Vec::new(); wanted.len()];
+                        let told = rows.read(usize::MAX, &mut columns);
+                        let bits: Vec<Vec<u64>> = columns
+                            .iter()
+                            .map(|column| {
+                                column.iter().map(|value: &f64| value.to_bits()).collect()
+                            })
+                            .collect();
+                        (bits, rows.lines.number, told)
+                    };
+                    if source.layout.columns != 4 {
+                        continue;
+                    }
+                    both += 1;
+                    assert_eq!(read(true), read(false), "{text}");
+                }
+            }
+        }
+        assert!(both > 300, "{both}");
+    }
+
+    #[test]
+    fn lines_are_whole_wherever_a_piece_of_the_text_ends() {
+        let mut text = String::from("t;v\n");
+        let row = "1;2.25\n";
+        while text.len() < 3 * PIECE_BYTES {
+            text.push_str(row);
+        }
+        let rows = (text.len() - 4) / row.len();
+        // A line longer than a piece, and a last one without an end.
+        text.push_str(&format!("2;{}3\n4;5", " ".repeat(PIECE_BYTES + 7)));
+        let (_, values) = read(text.as_bytes());
+        assert_eq!(values[1].len(), rows + 2);
+        assert!(values[1][..rows].iter().all(|&value| value == 2.25));
+        assert_eq!(values[1][rows..], [3.0, 5.0]);
+        let endless = format!("t;v\n1;2\n3;4\n{}", "5".repeat(LONGEST_LINE));
+        let told = source(endless.as_bytes()).err().unwrap();
+        assert_eq!(told.place, Place::Text { line: 4, column: 1 });
     }
 
     #[test]

@@ -29,7 +29,7 @@ pub enum Cells<'a> {
     Truths(&'a [Option<bool>]),
 }
 
-/// Writes the columns as `DOUBLE`, a missing value as null, what was done as metadata (`muslip.read`, one line each).
+/// Writes the columns as `DOUBLE`, a missing value as null, what was done as metadata (`muslip.read` in words, one line each, and [`MADE`](crate::made::MADE)).
 ///
 /// # Errors
 /// What the sink answers; [`io::ErrorKind::Unsupported`] in a build without the feature `parquet`.
@@ -40,7 +40,7 @@ pub fn write_parquet<W: Write + Send>(sink: W, converted: &Converted) -> io::Res
         .map(|name| (name.as_str(), ColumnKind::Numbers))
         .collect();
     let mut table = ParquetTable::new(sink, &columns)?;
-    table.note("muslip.read", &converted.notes.join("\n"));
+    table.note_making(&converted.notes, &converted.made);
     if let Some(start) = &converted.start_time {
         table.note("start_time", start);
     }
@@ -82,6 +82,9 @@ impl<W: Write + Send> ParquetTable<W> {
     /// Adds to what stands beside the table.
     pub fn note(&mut self, _key: &str, _text: &str) {}
 
+    /// Says beside the table how it was made.
+    pub fn note_making(&mut self, _notes: &[String], _made: &crate::made::Made) {}
+
     /// Writes rows.
     ///
     /// # Errors
@@ -116,6 +119,7 @@ mod with_parquet {
     use parquet::schema::types::Type;
 
     use super::{Cells, ColumnKind};
+    use crate::made::{MADE, Made};
 
     /// A table that is written some rows at a time: every column may have missing values, which are nulls.
     pub struct ParquetTable<W: Write + Send> {
@@ -166,6 +170,13 @@ mod with_parquet {
         pub fn note(&mut self, key: &str, text: &str) {
             let note = KeyValue::new(key.to_owned(), text.to_owned());
             self.file.append_key_value_metadata(note);
+        }
+
+        /// Says beside the table how it was made: in words, and in lines that are read back.
+        pub fn note_making(&mut self, notes: &[String], made: &Made) {
+            self.note("muslip.read", &notes.join("\n"));
+            let lines = [made.resampled_lines(), made.fault_lines()].concat();
+            self.note(MADE, &lines.join("\n"));
         }
 
         /// Writes rows: as many columns as the table has, all of one length.

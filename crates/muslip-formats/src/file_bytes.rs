@@ -4,8 +4,11 @@ use std::fs::File;
 use std::io::{Read, Seek, SeekFrom};
 
 use crate::error::Problem;
+#[cfg(any(feature = "mat", feature = "tdms"))]
+use crate::number::Number;
 
 /// Bytes fetched at a time, so that they stay near the processor.
+#[cfg(any(feature = "mat", feature = "tdms"))]
 const PIECE: u64 = 1 << 18;
 
 /// A file of known length.
@@ -51,7 +54,7 @@ impl FileBytes {
     }
 
     /// Exactly so many numbers, one after the other, appended; they are fetched a piece at a time.
-    #[allow(dead_code, reason = "of binary formats")]
+    #[cfg(any(feature = "mat", feature = "tdms"))]
     pub(crate) fn numbers(
         &self,
         offset: u64,
@@ -82,8 +85,14 @@ impl FileBytes {
         Ok(())
     }
 
-    #[allow(dead_code, reason = "of binary formats")]
     /// Exactly so many bytes; an error before anything is allocated if the file ends before.
+    #[cfg(any(
+        feature = "arrow",
+        feature = "mat",
+        feature = "mdf",
+        feature = "parquet",
+        feature = "tdms"
+    ))]
     pub(crate) fn exact(&self, offset: u64, wanted: u64) -> Result<Vec<u8>, Problem> {
         let fits = offset
             .checked_add(wanted)
@@ -104,12 +113,20 @@ impl FileBytes {
         Err(Problem::at_byte(offset, "the file has become shorter"))
     }
 
-    #[allow(dead_code, reason = "not every format streams")]
+    /// The file itself, for libraries that read it.
+    #[cfg(any(
+        feature = "arrow",
+        feature = "csv",
+        feature = "hdf5",
+        feature = "mat",
+        feature = "parquet"
+    ))]
     pub(crate) fn file(&self) -> &File {
         &self.file
     }
 }
 
+#[cfg(any(feature = "mat", feature = "tdms"))]
 fn short(offset: u64, count: u64, size: u64, length: u64) -> Problem {
     Problem::at_byte(
         offset,
@@ -122,159 +139,4 @@ fn too_large(offset: u64, bytes: u64) -> Problem {
         offset,
         format!("{bytes} bytes are more than this machine can address"),
     )
-}
-
-/// Reads numbers out of bytes, in one order; `None` past the end.
-#[allow(dead_code, reason = "of binary formats")]
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Cursor<'a> {
-    bytes: &'a [u8],
-    at: usize,
-    big: bool,
-}
-
-#[allow(dead_code, reason = "each format uses some")]
-impl<'a> Cursor<'a> {
-    pub(crate) fn new(bytes: &'a [u8], big_endian: bool) -> Self {
-        Self {
-            bytes,
-            at: 0,
-            big: big_endian,
-        }
-    }
-
-    pub(crate) fn at(&self) -> usize {
-        self.at
-    }
-
-    pub(crate) fn left(&self) -> usize {
-        self.bytes.len() - self.at
-    }
-
-    pub(crate) fn take(&mut self, count: usize) -> Option<&'a [u8]> {
-        let end = self.at.checked_add(count)?;
-        let taken = self.bytes.get(self.at..end)?;
-        self.at = end;
-        Some(taken)
-    }
-
-    fn array<const N: usize>(&mut self) -> Option<[u8; N]> {
-        let mut array: [u8; N] = self.take(N)?.try_into().ok()?;
-        if self.big {
-            array.reverse();
-        }
-        Some(array)
-    }
-
-    pub(crate) fn u8(&mut self) -> Option<u8> {
-        self.array().map(u8::from_le_bytes)
-    }
-
-    pub(crate) fn u16(&mut self) -> Option<u16> {
-        self.array().map(u16::from_le_bytes)
-    }
-
-    pub(crate) fn u32(&mut self) -> Option<u32> {
-        self.array().map(u32::from_le_bytes)
-    }
-
-    pub(crate) fn u64(&mut self) -> Option<u64> {
-        self.array().map(u64::from_le_bytes)
-    }
-
-    pub(crate) fn i32(&mut self) -> Option<i32> {
-        self.array().map(i32::from_le_bytes)
-    }
-
-    pub(crate) fn i64(&mut self) -> Option<i64> {
-        self.array().map(i64::from_le_bytes)
-    }
-
-    pub(crate) fn f64(&mut self) -> Option<f64> {
-        self.array().map(f64::from_le_bytes)
-    }
-}
-
-/// A type of number as files hold it.
-#[allow(dead_code, reason = "of binary formats")]
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Number {
-    I8,
-    I16,
-    I32,
-    I64,
-    U8,
-    U16,
-    U32,
-    U64,
-    F32,
-    F64,
-}
-
-#[allow(dead_code, reason = "of binary formats")]
-impl Number {
-    pub(crate) fn size(self) -> usize {
-        match self {
-            Self::I8 | Self::U8 => 1,
-            Self::I16 | Self::U16 => 2,
-            Self::I32 | Self::U32 | Self::F32 => 4,
-            Self::I64 | Self::U64 | Self::F64 => 8,
-        }
-    }
-
-    /// Appends the numbers in the bytes, one after the other; a rest that is none is left.
-    pub(crate) fn extend(self, bytes: &[u8], big_endian: bool, out: &mut Vec<f64>) {
-        fn all<const N: usize>(
-            bytes: &[u8],
-            big_endian: bool,
-            out: &mut Vec<f64>,
-            number: impl Fn([u8; N]) -> f64,
-        ) {
-            let (cells, _) = bytes.as_chunks::<N>();
-            if big_endian {
-                out.extend(cells.iter().map(|&(mut cell)| {
-                    cell.reverse();
-                    number(cell)
-                }));
-            } else {
-                out.extend(cells.iter().map(|&cell| number(cell)));
-            }
-        }
-        match self {
-            Self::I8 => all(bytes, big_endian, out, |b| f64::from(i8::from_le_bytes(b))),
-            Self::I16 => all(bytes, big_endian, out, |b| f64::from(i16::from_le_bytes(b))),
-            Self::I32 => all(bytes, big_endian, out, |b| f64::from(i32::from_le_bytes(b))),
-            Self::I64 => all(bytes, big_endian, out, |b| i64::from_le_bytes(b) as f64),
-            Self::U8 => all(bytes, big_endian, out, |b| f64::from(u8::from_le_bytes(b))),
-            Self::U16 => all(bytes, big_endian, out, |b| f64::from(u16::from_le_bytes(b))),
-            Self::U32 => all(bytes, big_endian, out, |b| f64::from(u32::from_le_bytes(b))),
-            Self::U64 => all(bytes, big_endian, out, |b| u64::from_le_bytes(b) as f64),
-            Self::F32 => all(bytes, big_endian, out, |b| f64::from(f32::from_le_bytes(b))),
-            Self::F64 => all(bytes, big_endian, out, f64::from_le_bytes),
-        }
-    }
-
-    /// The number at the start of the bytes; `NaN` where there are too few.
-    pub(crate) fn read(self, bytes: &[u8], big_endian: bool) -> f64 {
-        fn array<const N: usize>(bytes: &[u8], big: bool) -> Option<[u8; N]> {
-            let mut array: [u8; N] = bytes.get(..N)?.try_into().ok()?;
-            if big {
-                array.reverse();
-            }
-            Some(array)
-        }
-        let value = match self {
-            Self::I8 => array(bytes, big_endian).map(|b| f64::from(i8::from_le_bytes(b))),
-            Self::I16 => array(bytes, big_endian).map(|b| f64::from(i16::from_le_bytes(b))),
-            Self::I32 => array(bytes, big_endian).map(|b| f64::from(i32::from_le_bytes(b))),
-            Self::I64 => array(bytes, big_endian).map(|b| i64::from_le_bytes(b) as f64),
-            Self::U8 => array(bytes, big_endian).map(|b| f64::from(u8::from_le_bytes(b))),
-            Self::U16 => array(bytes, big_endian).map(|b| f64::from(u16::from_le_bytes(b))),
-            Self::U32 => array(bytes, big_endian).map(|b| f64::from(u32::from_le_bytes(b))),
-            Self::U64 => array(bytes, big_endian).map(|b| u64::from_le_bytes(b) as f64),
-            Self::F32 => array(bytes, big_endian).map(|b| f64::from(f32::from_le_bytes(b))),
-            Self::F64 => array(bytes, big_endian).map(f64::from_le_bytes),
-        };
-        value.unwrap_or(f64::NAN)
-    }
 }

@@ -178,3 +178,35 @@ fn is_mat4(head: &[u8], length: u64) -> bool {
     };
     header(false) || header(true)
 }
+
+#[cfg(test)]
+mod tests {
+    use std::io::Write as _;
+
+    use super::*;
+
+    #[test]
+    fn what_cannot_be_read_is_named_with_what_to_do() {
+        let told = |start: &[u8]| {
+            let mut file = tempfile::tempfile().unwrap();
+            file.write_all(start).unwrap();
+            file.write_all(&[0; 600]).unwrap();
+            let format = Format::of(&FileBytes::new(file).unwrap());
+            format.expect_err("is refused").reason
+        };
+        for (start, reason) in [
+            (
+                &b"FEA1"[..],
+                "Feather v1 is not supported: write Feather v2 or Parquet",
+            ),
+            (b"TDSh", "a TDMS index: give the .tdms file beside it"),
+            (b"PARE", "Parquet with an encrypted footer is not supported"),
+            (
+                b"PK\x03\x04",
+                "a ZIP archive or Office document is no format of recordings: unpack or export it",
+            ),
+        ] {
+            assert_eq!(told(start), reason);
+        }
+    }
+}

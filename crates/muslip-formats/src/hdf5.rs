@@ -1,16 +1,21 @@
-//! HDF5 and MAT v7.3, by `hdf5-reader`.
+//! HDF5 and MAT v7.3, by `hdf5-reader`, and h5py's filter LZF.
 //!
 //! A vector of numbers is a channel in the group of its path; of a table (compound type) each field of numbers is one. The columns of a matrix that is
 //! taller than wide are channels of their own (in MAT v7.3, whose matrices lie transposed, its rows). The unit is the attribute `unit` or `units`.
 
+use hdf5_reader::error::Error;
 use hdf5_reader::group::Group;
-use hdf5_reader::{Attribute, ByteOrder, Dataset, Datatype, FileStorage, Hdf5File, OpenOptions};
+use hdf5_reader::{
+    Attribute, ByteOrder, Dataset, Datatype, FileStorage, FilterRegistry, Hdf5File, OpenOptions,
+};
 use std::sync::Arc;
 
 use crate::MOST_BYTES;
 use crate::error::Problem;
-use crate::file_bytes::{FileBytes, Number};
+use crate::file_bytes::FileBytes;
 use crate::format::Format;
+use crate::lzf;
+use crate::number::Number;
 use crate::source::{Channel, Kind, Series, Source};
 
 /// Groups within groups that are followed.
@@ -42,8 +47,19 @@ pub(crate) struct Hdf5Source {
     last: Option<(String, Vec<u8>)>,
 }
 
-fn problem(error: hdf5_reader::error::Error) -> Problem {
+fn problem(error: Error) -> Problem {
     Problem::whole(error.to_string())
+}
+
+/// The library's filters, and h5py's own.
+fn filters(limit: usize) -> FilterRegistry {
+    let mut filters = FilterRegistry::new();
+    let unpack = move |_: &_, packed: &[u8], _| {
+        let damaged = || Error::DecompressionError("LZF: damaged, or over 1 GiB".to_owned());
+        lzf::unpacked(packed, limit).ok_or_else(damaged)
+    };
+    filters.register(lzf::FILTER, Box::new(unpack));
+    filters
 }
 
 impl Hdf5Source {
@@ -52,7 +68,8 @@ impl Hdf5Source {
         let limit = usize::try_from(MOST_BYTES).unwrap_or(usize::MAX);
         let options = OpenOptions::default()
             .with_max_read_bytes(limit)
-            .with_max_chunk_bytes(limit);
+            .with_max_chunk_bytes(limit)
+            .with_filter_registry(filters(limit));
         let file =
             Hdf5File::from_storage_with_options(Arc::new(storage), options).map_err(problem)?;
         let root = file.root_group().map_err(problem)?;

@@ -3,7 +3,7 @@
 //! [`SourceFile::open`] tells the format by the file's first bytes and lists its channels; [`SourceFile::read`] reads chosen ones as `f64` with
 //! their time and validity. [`map`] and [`roles`] say which channel is which column of a recording, [`units`] brings readings to SI, [`raster`]
 //! brings channels of different rates onto one time, and [`convert`] does it all;
-//! [`stream`] does it some rows at a time where all channels share one time.
+//! [`stream`] does it some rows at a time, [`made`] is what a recording says of it afterwards.
 //!
 //! | feature | format | told by |
 //! | --- | --- | --- |
@@ -26,6 +26,8 @@ mod cells;
 pub mod convert;
 #[cfg(feature = "csv")]
 mod csv_text;
+#[cfg(any(feature = "mat", feature = "tdms"))]
+mod cursor;
 mod error;
 mod export;
 mod file_bytes;
@@ -34,6 +36,9 @@ mod guard;
 #[cfg(feature = "hdf5")]
 mod hdf5;
 pub mod listing;
+#[cfg(feature = "hdf5")]
+mod lzf;
+pub mod made;
 pub mod map;
 #[cfg(feature = "mat")]
 mod mat;
@@ -41,6 +46,8 @@ mod mat;
 mod mdf;
 #[cfg(feature = "mdf")]
 mod mdf_join;
+#[cfg(any(feature = "hdf5", feature = "mat", feature = "tdms"))]
+mod number;
 #[cfg(feature = "parquet")]
 mod parquet;
 pub mod raster;
@@ -55,6 +62,11 @@ mod tdms;
 mod tdms_property;
 #[cfg(feature = "tdms")]
 mod tdms_scaling;
+#[cfg(feature = "tdms")]
+mod tdms_sensor;
+#[cfg(feature = "tdms")]
+mod tdms_thermocouple;
+#[cfg(any(feature = "csv", feature = "mdf", feature = "tdms"))]
 mod time_text;
 pub mod units;
 

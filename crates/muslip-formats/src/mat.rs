@@ -9,8 +9,10 @@ use std::io::{Read, Seek, SeekFrom};
 use flate2::read::ZlibDecoder;
 
 use crate::MOST_BYTES;
+use crate::cursor::Cursor;
 use crate::error::Problem;
-use crate::file_bytes::{Cursor, FileBytes, Number};
+use crate::file_bytes::FileBytes;
+use crate::number::Number;
 use crate::source::{Channel, Kind, Series, Source};
 
 /// Bytes in which the description of a matrix of numbers stands.
@@ -407,14 +409,18 @@ impl MatSource {
         let mut words = Cursor::new(flags, big);
         let flags = words.u32().ok_or_else(short)?;
         let (class, complex, logical) = (flags & 0xff, flags & 0x800 != 0, flags & 0x200 != 0);
-        // Objects of classes have another order: their names first.
+        // Objects of classes have another order: their name, the system of their class, and that class.
         if class == 17 {
+            let mut text = || element(&mut cursor).map(|(_, text)| String::from_utf8_lossy(text));
+            let own = text().filter(|name| !name.is_empty());
+            let (_, kind) = (text(), text());
+            let kind = kind.as_deref().unwrap_or("object");
             self.unread(
                 group,
-                given.unwrap_or("object"),
+                given.unwrap_or(own.as_deref().unwrap_or("object")),
                 0,
                 Kind::Array,
-                "an object (table, timetable, string or class): export its columns",
+                &format!("a MATLAB {kind}: export its columns"),
             );
             return Ok(());
         }

@@ -11,6 +11,7 @@ use parquet::schema::types::ColumnDescriptor;
 use crate::cells;
 use crate::error::Problem;
 use crate::file_bytes::FileBytes;
+use crate::made::{MADE, Made};
 use crate::source::{Channel, Kind, Series, Source};
 use crate::units;
 
@@ -37,6 +38,8 @@ pub(crate) struct ParquetSource {
     file: SerializedFileReader<std::fs::File>,
     channels: Vec<Channel>,
     readings: Vec<Reading>,
+    /// What the table says of a conversion that it came from; `None` where it is of another program.
+    made: Option<Made>,
 }
 
 fn problem(error: parquet::errors::ParquetError) -> Problem {
@@ -59,6 +62,7 @@ impl ParquetSource {
             all.iter().find(|entry| entry.key == key)?.value.clone()
         };
         let schema = entry("ARROW:schema").and_then(|text| arrow_schema(&text));
+        let made = entry(MADE).map(|text| Made::of_lines(text.lines()));
         let rows = u64::try_from(metadata.num_rows())
             .map_err(|_| Problem::whole("a negative number of rows"))?;
         let descriptor = metadata.schema_descr_ptr();
@@ -112,6 +116,7 @@ impl ParquetSource {
             file,
             channels,
             readings,
+            made,
         })
     }
 
@@ -144,9 +149,11 @@ impl ParquetSource {
                 channel.samples
             )));
         }
+        // A conversion leaves cells empty, and has said why.
+        let says_invalid = self.made.is_none() && column.invalid.contains(&true);
         Ok(Series {
             time_s: None,
-            invalid: column.invalid.contains(&true).then_some(column.invalid),
+            invalid: says_invalid.then_some(column.invalid),
             values: column.values,
         })
     }
@@ -350,6 +357,10 @@ impl Source for ParquetSource {
 
     fn channels(&self) -> &[Channel] {
         &self.channels
+    }
+
+    fn made(&self) -> Made {
+        self.made.clone().unwrap_or_default()
     }
 
     fn read(&mut self, wanted: &[usize]) -> Result<Vec<Series>, Problem> {

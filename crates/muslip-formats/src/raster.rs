@@ -80,18 +80,77 @@ pub fn onto(raster: &[f64], times: &[f64], values: &[f64], method: Method) -> (V
     if raster == times {
         return (values.to_vec(), Done::Kept);
     }
-    let longest = longest_step_s(times);
-    let faster = match (rate_hz(times), rate_hz(raster)) {
-        (Some(own), Some(wanted)) if own > FASTER_BY * wanted => Some(wanted),
-        _ => None,
-    };
-    if let (Some(rate), Method::Linear) = (faster, method) {
-        let edge_hz = EDGE * rate;
-        return (
-            low_passed(raster, times, values, longest, edge_hz),
-            Done::Decimated { edge_hz },
-        );
+    let bringing = Bringing::of(interval_s(times), rate_hz(times), rate_hz(raster), method);
+    (bringing.values(raster, times, values), bringing.done)
+}
+
+/// How a channel is brought onto a raster: known before its readings are, so that they may come some at a time.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Bringing {
+    pub(crate) done: Done,
+    /// Longest step in s that is no gap.
+    longest_s: f64,
+}
+
+impl Bringing {
+    /// Of a channel's median interval in s and its rate, onto a raster of a rate.
+    pub(crate) fn of(
+        interval_s: Option<f64>,
+        own: Option<f64>,
+        raster: Option<f64>,
+        method: Method,
+    ) -> Self {
+        let done = match (own, raster, method) {
+            (Some(own), Some(wanted), Method::Linear) if own > FASTER_BY * wanted => {
+                Done::Decimated {
+                    edge_hz: EDGE * wanted,
+                }
+            }
+            _ => Done::Interpolated(method),
+        };
+        Self {
+            done,
+            longest_s: longest_of(interval_s),
+        }
     }
+
+    /// How far it looks to both sides, in s. Readings that lie farther away, but for the next on each side, change nothing.
+    pub(crate) fn reach_s(&self) -> f64 {
+        match self.done {
+            Done::Decimated { edge_hz } => reach_s(edge_hz),
+            Done::Kept | Done::Interpolated(_) => 0.0,
+        }
+    }
+
+    /// Values at the raster's times, of readings that begin and end beyond the reach of these or with the channel.
+    pub(crate) fn values(&self, raster: &[f64], times: &[f64], values: &[f64]) -> Vec<f64> {
+        match self.done {
+            Done::Decimated { edge_hz } => {
+                low_passed(raster, times, values, self.longest_s, edge_hz)
+            }
+            Done::Interpolated(Method::Hold) => {
+                between(raster, times, values, self.longest_s, Method::Hold)
+            }
+            Done::Kept | Done::Interpolated(Method::Linear) => {
+                between(raster, times, values, self.longest_s, Method::Linear)
+            }
+        }
+    }
+}
+
+/// How far the low-pass looks to both sides, in s.
+fn reach_s(edge_hz: f64) -> f64 {
+    CROSSINGS / (2.0 * edge_hz)
+}
+
+/// Values between two readings, by the method.
+fn between(
+    raster: &[f64],
+    times: &[f64],
+    values: &[f64],
+    longest: f64,
+    method: Method,
+) -> Vec<f64> {
     let mut next = 0;
     let at = |&time: &f64| {
         while times.get(next).is_some_and(|&t| t <= time) {
@@ -118,7 +177,7 @@ pub fn onto(raster: &[f64], times: &[f64], values: &[f64], method: Method) -> (V
             }
         }
     };
-    (raster.iter().map(at).collect(), Done::Interpolated(method))
+    raster.iter().map(at).collect()
 }
 
 /// Stretches without a gap and without a missing reading.
@@ -151,7 +210,7 @@ fn low_passed(
     longest: f64,
     edge_hz: f64,
 ) -> Vec<f64> {
-    let reach = CROSSINGS / (2.0 * edge_hz);
+    let reach = reach_s(edge_hz);
     let stretches = stretches(times, values, longest);
     let mut stretch = 0;
     let mut low = 0;

@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use crate::error::Problem;
+use crate::made::Made;
 
 /// What the readings of a channel are.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -121,6 +122,11 @@ pub trait Source: Send {
     fn pieces(&self, wanted: &[usize]) -> Result<Option<Pieces<'_>>, Problem> {
         let _ = wanted;
         Ok(None)
+    }
+
+    /// What the file says of a conversion that it came from.
+    fn made(&self) -> Made {
+        Made::default()
     }
 
     /// What of the file was found damaged or left out so far, one line each.

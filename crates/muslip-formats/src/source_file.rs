@@ -7,6 +7,7 @@ use crate::error::{FormatError, Problem};
 use crate::file_bytes::FileBytes;
 use crate::format::Format;
 use crate::guard::guarded;
+use crate::made::Made;
 use crate::source::{Channel, Pieces, Series, Source};
 
 /// An open file: its format and its channels.
@@ -14,6 +15,7 @@ pub struct SourceFile {
     path: PathBuf,
     format: Format,
     source: Box<dyn Source>,
+    made: Made,
 }
 
 impl std::fmt::Debug for SourceFile {
@@ -49,14 +51,28 @@ impl SourceFile {
                 return Err(Problem::whole("the file is empty"));
             }
             let format = Format::of(&bytes)?;
-            Ok((format, source(format, bytes)?))
+            let source = source(format, bytes)?;
+            let made = source.made();
+            Ok((format, source, made))
         };
-        let (format, source) = guarded(open).map_err(|problem| problem.in_file(path))?;
+        let (format, source, made) = guarded(open).map_err(|problem| problem.in_file(path))?;
         Ok(Self {
             path: path.to_owned(),
             format,
             source,
+            made,
         })
+    }
+
+    /// A source that is open already.
+    #[cfg(test)]
+    pub(crate) fn of_source(path: PathBuf, format: Format, source: Box<dyn Source>) -> Self {
+        Self {
+            path,
+            format,
+            made: source.made(),
+            source,
+        }
     }
 
     /// The format that a file is in, by its bytes.
@@ -90,6 +106,12 @@ impl SourceFile {
     #[must_use]
     pub fn channels(&self) -> &[Channel] {
         self.source.channels()
+    }
+
+    /// What the file says of a conversion that it came from.
+    #[must_use]
+    pub fn made(&self) -> &Made {
+        &self.made
     }
 
     /// Reads channels by their place in [`SourceFile::channels`], in the order asked for.

@@ -1,14 +1,22 @@
-//! A file of any length converted some rows at a time, where its mapped channels share one time: nothing has to be brought onto another then.
+//! A file of any length converted some rows at a time. Channels with times of their own go side by side: of each one only what the raster's next rows
+//! need is in memory. Their times are gone through once before, because rates, gaps and the raster hang on all of them.
 
+use std::hash::{DefaultHasher, Hash, Hasher};
 use std::io;
+use std::mem::take;
 
-use crate::convert::{self, Prepared};
+use crate::convert::{self, Prepared, Told};
 use crate::error::{FormatError, Problem};
+use crate::made::{Fault, Made};
 use crate::map::Map;
+use crate::raster::{Bringing, Done};
 use crate::roles::TIME;
-use crate::source::Series;
-use crate::source_file::SourceFile;
+use crate::source::{Channel, Series};
+use crate::source_file::{FilePieces, SourceFile};
 use crate::steps::Steps;
+
+/// Most rows that the sink gets at a time, and about as many readings of a channel that is faster.
+const MOST_ROWS: usize = 1 << 16;
 
 /// Who takes the rows of a conversion.
 pub trait RowSink {
@@ -28,6 +36,8 @@ pub struct Streamed {
     pub start_time: Option<String>,
     /// What was read, converted or dropped, one line each, as [`convert::Converted::notes`].
     pub notes: Vec<String>,
+    /// What of it a diagnosis must know.
+    pub made: Made,
 }
 
 /// Why there is none.
@@ -45,49 +55,89 @@ pub enum StreamError {
 #[derive(Debug)]
 pub struct Stream {
     prepared: Prepared,
+    groups: Vec<Group>,
+    /// The group whose times are kept, or span the raster, where the map says so.
+    raster: Option<usize>,
+}
+
+/// Columns that share one time.
+#[derive(Debug)]
+struct Group {
     /// Channels to be read: of a format without a time of its own its time first.
     wanted: Vec<usize>,
     /// How readings of that time become seconds: factor, offset, whether it is kept as it is.
     time: Option<(f64, f64, bool)>,
+    /// How late they report.
+    delay_s: f64,
+    /// Which of the columns they are.
+    members: Vec<usize>,
 }
 
 impl Stream {
-    /// The conversion of a file by a map, or by a guess without one; `None` where it has to be read whole: channels with times of their own, a raster
-    /// of another rate, a format that is not read in pieces.
+    /// The conversion of a file by a map, or by a guess without one; `None` where it has to be read whole: a format that is not read in pieces, or
+    /// one of several times in its columns.
     ///
     /// # Errors
     /// As [`convert::convert`].
     pub fn of(file: &SourceFile, map: Option<&Map>) -> Result<Option<Self>, FormatError> {
         let fail = |problem: Problem| problem.in_file(file.path());
         let prepared = Prepared::of(file, map).map_err(fail)?;
-        let roles = &prepared.roles;
-        let is_plain = prepared.time.rate_hz.is_none()
-            && roles.assigned.iter().all(|one| one.entry.delay_s == 0.0)
-            && prepared
-                .time
-                .raster
-                .as_ref()
-                .is_none_or(|raster| roles.assigned.iter().any(|one| &one.column == raster));
-        if !is_plain {
-            return Ok(None);
-        }
-        let mut wanted: Vec<usize> = roles.assigned.iter().map(|one| one.channel).collect();
-        let time = match prepared.one_time(file).map_err(fail)? {
-            convert::OneTime::Own => None,
+        let column = match prepared.one_time(file).map_err(fail)? {
             convert::OneTime::Column(at, entry) => {
                 let channel = &prepared.channels[at];
                 let factor = convert::time_factor(channel, &entry).map_err(fail)?;
-                wanted.insert(0, at);
                 let offset = entry.offset - entry.delay_s;
-                Some((entry.scale * factor, offset, channel.name == TIME))
+                Some((at, (entry.scale * factor, offset, channel.name == TIME)))
             }
+            convert::OneTime::Own => None,
+            convert::OneTime::Several if file.format().has_own_time() => None,
             convert::OneTime::Several => return Ok(None),
         };
-        let can = file.pieces(&wanted)?.is_some();
-        Ok(can.then_some(Self {
+        let mut groups: Vec<(&str, Group)> = Vec::new();
+        for (place, one) in prepared.roles.assigned.iter().enumerate() {
+            let name = match column {
+                Some(_) => "",
+                None => prepared.channels[one.channel].group.as_str(),
+            };
+            let delay_s = one.entry.delay_s;
+            let mut found = groups.iter_mut();
+            let found = found.find(|(other, group)| *other == name && group.delay_s == delay_s);
+            if let Some((_, group)) = found {
+                group.wanted.push(one.channel);
+                group.members.push(place);
+                continue;
+            }
+            let mut wanted: Vec<usize> = column.iter().map(|(at, _)| *at).collect();
+            wanted.push(one.channel);
+            groups.push((
+                name,
+                Group {
+                    wanted,
+                    time: column.map(|(_, time)| time),
+                    delay_s,
+                    members: vec![place],
+                },
+            ));
+        }
+        let groups: Vec<Group> = groups.into_iter().map(|(_, group)| group).collect();
+        for group in &groups {
+            if file.pieces(&group.wanted)?.is_none() {
+                return Ok(None);
+            }
+        }
+        let raster = match &prepared.time.raster {
+            None => None,
+            Some(name) => {
+                let place = prepared.raster_place(name).map_err(fail)?;
+                groups
+                    .iter()
+                    .position(|group| group.members.contains(&place))
+            }
+        };
+        Ok(Some(Self {
             prepared,
-            wanted,
-            time,
+            groups,
+            raster,
         }))
     }
 
@@ -111,11 +161,16 @@ impl Stream {
         self.prepared.roles.guessed
     }
 
-    /// Rows that the file announces.
+    /// Rows that the file announces: the most readings of a column.
     #[must_use]
     pub fn announced_rows(&self) -> u64 {
+        let groups = self.groups.iter();
+        groups.map(|group| self.announced(group)).max().unwrap_or(0)
+    }
+
+    fn announced(&self, group: &Group) -> u64 {
         let channels = &self.prepared.channels;
-        let samples = self.wanted.iter().filter_map(|&at| channels.get(at));
+        let samples = group.wanted.iter().filter_map(|&at| channels.get(at));
         samples.map(|channel| channel.samples).max().unwrap_or(0)
     }
 
@@ -129,104 +184,498 @@ impl Stream {
         sink: &mut dyn RowSink,
         progress: &mut dyn FnMut(u64),
     ) -> Result<Streamed, StreamError> {
-        let fail = |problem: Problem| problem.in_file(file.path());
-        let Some(pieces) = file.pieces(&self.wanted)? else {
-            return Err(fail(Problem::whole("cannot be read in pieces")).into());
+        let units = self.prepared.units();
+        let units = units.map_err(|problem| problem.in_file(file.path()))?;
+        let mut tracks = Vec::with_capacity(self.groups.len());
+        for group in &self.groups {
+            tracks.push(Track::new(self, file, group, &units, &group.wanted)?);
+        }
+        let mut out = Out {
+            sink,
+            progress,
+            rows: 0,
+            empty: vec![0; units.len()],
         };
-        let units = self.prepared.units().map_err(fail)?;
-        let assigned = &self.prepared.roles.assigned;
-        let mut steps = Steps::default();
-        let mut start_s = None;
-        let mut untimed = 0_u64;
-        let mut told = vec![(0_u64, 0_u64); assigned.len()];
-        for piece in pieces {
-            let (times, series) = self.times(piece?).map_err(fail)?;
-            let start_s = *start_s.get_or_insert_with(|| match self.time {
-                Some((_, _, true)) => 0.0,
-                _ => times
-                    .iter()
-                    .copied()
-                    .find(|time| time.is_finite())
-                    .unwrap_or(0.0),
-            });
-            let kept: Vec<bool> = times.iter().map(|time| time.is_finite()).collect();
-            let mut columns = vec![Vec::with_capacity(times.len())];
-            for &time in times.iter().filter(|time| time.is_finite()) {
-                if let Some((_, before)) = steps.ends
-                    && time <= before
-                {
-                    let channel = match self.time {
-                        Some(_) => &self.prepared.channels[self.wanted[0]],
-                        None => &self.prepared.channels[assigned[0].channel],
-                    };
-                    let problem = convert::out_of_order(channel, steps.count, before, time);
-                    return Err(fail(problem).into());
-                }
-                steps.next(time);
-                columns[0].push(time - start_s);
-            }
-            let is_whole = kept.iter().all(|kept| *kept);
-            untimed += kept.iter().filter(|kept| !**kept).count() as u64;
-            for (((one, series), (factor, offset, _)), (empty, invalid)) in
-                assigned.iter().zip(series).zip(&units).zip(&mut told)
-            {
-                let Series {
-                    mut values,
-                    invalid: flags,
-                    ..
-                } = series;
-                *invalid += convert::bring(&mut values, flags, &one.entry, *factor, *offset);
-                if !is_whole {
-                    let mut kept = kept.iter();
-                    values.retain(|_| kept.next().copied().unwrap_or(true));
-                }
-                *empty += values.iter().filter(|value| value.is_nan()).count() as u64;
-                columns.push(values);
-            }
-            sink.rows(&columns)?;
-            progress(steps.count);
+        let raster = match (&self.groups[..], self.prepared.time.rate_hz) {
+            ([_], None) => self.kept(&mut tracks, &mut out)?,
+            _ => self.brought(file, &units, &mut tracks, &mut out)?,
+        };
+        if out.rows == 0 {
+            let problem = Problem::whole("the mapped channels have no readings");
+            return Err(problem.in_file(file.path()).into());
         }
-        if steps.count == 0 {
-            return Err(fail(Problem::whole("the mapped channels have no readings")).into());
-        }
-        let announced = self.announced_rows();
-        let mut faults = self.prepared.left_out.clone();
-        if steps.count + untimed < announced {
-            faults.push(format!(
-                "{} of {announced} announced readings are there",
-                steps.count + untimed
-            ));
-        }
-        if untimed > 0 {
-            faults.push(format!(
-                "{untimed} readings without a time stamp were left out"
-            ));
-        }
-        for (from, to) in steps.gaps(convert::MOST_GAPS) {
-            faults.push(format!(
-                "gap of {} s at {} s",
-                convert::rounded(to - from),
-                convert::rounded(from - start_s.unwrap_or(0.0))
-            ));
-        }
+        let (rows, empty) = (out.rows, out.empty);
+        let (notes, made) = self.told(file, &units, &tracks, &raster, &empty);
         Ok(Streamed {
-            rows: steps.count,
+            rows,
             start_time: file.start_time(),
-            notes: self.notes(file, &steps, &told, faults),
+            notes,
+            made,
         })
     }
 
-    /// Times in s, and the series of the columns.
-    fn times(&self, mut piece: Vec<Series>) -> Result<(Vec<f64>, Vec<Series>), Problem> {
-        let times = match self.time {
-            Some((factor, offset, _)) => {
-                let time = piece.remove(0);
-                let seconds = time.values.into_iter().map(|value| factor * value + offset);
-                seconds.collect()
+    /// One group whose times are kept: its readings as they come.
+    fn kept(&self, tracks: &mut [Track<'_>], out: &mut Out<'_>) -> Result<Raster, StreamError> {
+        let mut start_s = None;
+        for track in &mut *tracks {
+            while track.next()? {
+                let Some(&first) = track.times.first() else {
+                    continue;
+                };
+                let start_s = *start_s.get_or_insert(if track.keeps() { 0.0 } else { first });
+                let times = take(&mut track.times);
+                let mut columns = vec![times.iter().map(|time| time - start_s).collect()];
+                columns.extend(track.columns.iter_mut().map(take));
+                out.rows(&columns)?;
             }
-            None => {
+        }
+        let steps = tracks.first().map(|track| &track.steps);
+        let column = self.prepared.roles.assigned.first();
+        let column = self
+            .prepared
+            .time
+            .raster
+            .as_ref()
+            .or(column.map(|one| &one.column));
+        let rate_hz = steps.and_then(Steps::rate_hz);
+        Ok(Raster {
+            start_s: start_s.unwrap_or(0.0),
+            rate_hz,
+            words: convert::raster_words(column.map_or("", String::as_str), rate_hz),
+            done: vec![Done::Kept; self.prepared.roles.assigned.len()],
+        })
+    }
+
+    /// Several groups, or a raster of another rate.
+    fn brought(
+        &self,
+        file: &SourceFile,
+        units: &[(f64, f64, String)],
+        tracks: &mut [Track<'_>],
+        out: &mut Out<'_>,
+    ) -> Result<Raster, StreamError> {
+        let assigned = &self.prepared.roles.assigned;
+        let mut seen = Vec::with_capacity(self.groups.len());
+        for group in &self.groups {
+            // Of the channels one, so that its times are given.
+            let first = group.time.is_some().into();
+            let wanted = group.wanted.get(..=first).unwrap_or_default();
+            seen.push(Track::new(self, file, group, units, wanted)?.seen()?);
+        }
+        let rate = |group: &usize| seen[*group].steps.rate_hz();
+        // The first of equals in the order of the columns, as where all is read at once.
+        let in_order = assigned.iter().enumerate().filter_map(|(place, _)| {
+            let mut groups = self.groups.iter();
+            groups.position(|group| group.members.contains(&place))
+        });
+        let fastest = in_order.reduce(|best, one| {
+            let is_faster = rate(&one).unwrap_or(0.0) > rate(&best).unwrap_or(0.0) * (1.0 + 1e-6);
+            if is_faster { one } else { best }
+        });
+        let chosen = self.raster.or(fastest).unwrap_or(0);
+        let starts = seen
+            .iter()
+            .filter_map(|one| one.steps.ends)
+            .map(|ends| ends.0);
+        let keeps = self.groups.iter().any(Group::keeps);
+        let first_s = starts.fold(f64::INFINITY, f64::min);
+        let start_s = if keeps { 0.0 } else { first_s };
+        let name = match &self.prepared.time.raster {
+            Some(name) => name,
+            None => &assigned[self.groups[chosen].members[0]].column,
+        };
+        let mut grid = match self.prepared.time.rate_hz {
+            None => Grid::Times,
+            Some(rate_hz) => {
+                let rows = convert::even_rows(seen[chosen].steps.ends, rate_hz);
+                let (first_s, rows) = rows.map_err(|problem| problem.in_file(file.path()))?;
+                Grid::Even {
+                    first_s,
+                    rate_hz,
+                    next: 0,
+                    rows,
+                }
+            }
+        };
+        let (rate_hz, words) = match self.prepared.time.rate_hz {
+            None => (rate(&chosen), convert::raster_words(name, rate(&chosen))),
+            Some(rate_hz) => (Some(rate_hz), convert::even_words(name, rate_hz)),
+        };
+        let is_kept = |group: usize| {
+            matches!(grid, Grid::Times) && seen[group].times_hash == seen[chosen].times_hash
+        };
+        let fastest_hz = (0..seen.len())
+            .filter_map(|group| rate(&group))
+            .fold(0.0, f64::max);
+        // So many s of every channel are about so many readings of the fastest.
+        let span_s = MOST_ROWS as f64 / fastest_hz;
+        let mut done = vec![Done::Kept; assigned.len()];
+        let mut ways: Vec<Vec<Bringing>> = Vec::with_capacity(seen.len());
+        for (group, seen) in self.groups.iter().zip(&seen) {
+            let way = |&place: &usize| {
+                let method = assigned[place].entry.method;
+                let steps = &seen.steps;
+                Bringing::of(steps.interval_s(), steps.rate_hz(), rate_hz, method)
+            };
+            ways.push(group.members.iter().map(way).collect());
+        }
+        for (at, group) in self
+            .groups
+            .iter()
+            .enumerate()
+            .filter(|(at, _)| !is_kept(*at))
+        {
+            for (&place, way) in group.members.iter().zip(&ways[at]) {
+                done[place] = way.done;
+            }
+        }
+        while let Some(Next { times, mut kept }) = grid.next(&mut tracks[chosen], span_s)? {
+            let (Some(&from), Some(&to)) = (times.first(), times.last()) else {
+                break;
+            };
+            let mut columns = vec![Vec::new(); 1 + assigned.len()];
+            for (at, (track, ways)) in tracks.iter_mut().zip(&ways).enumerate() {
+                let members = track.group.members.iter().enumerate();
+                if at == chosen && matches!(grid, Grid::Times) {
+                    for ((_, &place), values) in members.zip(kept.drain(..)) {
+                        columns[1 + place] = values;
+                    }
+                    continue;
+                }
+                let reach_s = ways.iter().map(Bringing::reach_s).fold(0.0, f64::max);
+                track.go_to(from - reach_s, to + reach_s)?;
+                for ((member, &place), way) in members.zip(ways) {
+                    columns[1 + place] = way.values(&times, &track.times, &track.columns[member]);
+                }
+            }
+            columns[0] = times.into_iter().map(|time| time - start_s).collect();
+            out.rows(&columns)?;
+        }
+        // What lies behind the raster's end is counted as well.
+        for track in tracks {
+            track.go_to(f64::INFINITY, f64::INFINITY)?;
+        }
+        Ok(Raster {
+            start_s,
+            rate_hz,
+            words,
+            done,
+        })
+    }
+
+    /// What was done, in words and for a diagnosis.
+    fn told(
+        &self,
+        file: &SourceFile,
+        units: &[(f64, f64, String)],
+        tracks: &[Track<'_>],
+        raster: &Raster,
+        empty: &[u64],
+    ) -> (Vec<String>, Made) {
+        let Prepared {
+            channels, roles, ..
+        } = &self.prepared;
+        let start_s = raster.start_s;
+        let mut notes = vec![self.prepared.read_as(file)];
+        notes.push(format!("{TIME}: {}", raster.words));
+        let mut made = Made::default();
+        let mut faults = self.prepared.left_out.clone();
+        let mut gaps_in_words = Vec::new();
+        let (mut first_s, mut last_s) = (f64::INFINITY, f64::NEG_INFINITY);
+        for (place, one) in roles.assigned.iter().enumerate() {
+            let mut of = tracks.iter().filter_map(|track| {
+                let members = &mut track.group.members.iter();
+                Some((track, members.position(|&other| other == place)?))
+            });
+            let Some((track, member)) = of.next() else {
+                continue;
+            };
+            let gaps = track.steps.gaps(convert::MOST_GAPS);
+            let told = Told {
+                column: &one.column,
+                channel: &channels[one.channel],
+                unit: &convert::unit_words(&units[place].2, &one.entry),
+                done: raster.done[place],
+                interval_s: track.steps.interval_s(),
+                rate_hz: track.steps.rate_hz(),
+                raster_hz: raster.rate_hz,
+                ends: track
+                    .steps
+                    .ends
+                    .map(|(from, to)| (from - start_s, to - start_s)),
+                gaps: gaps
+                    .iter()
+                    .map(|(from, to)| (from - start_s, to - start_s))
+                    .collect(),
+                empty: empty[place],
+                invalid: track.invalid[member],
+            };
+            told.tell(&mut notes, &mut made);
+            made.inherit(file.made(), &channels[one.channel].name, &one.column);
+            if member == 0 {
+                let prefix = match self.groups.len() {
+                    1 => String::new(),
+                    _ => format!("{}: ", channels[one.channel].shown()),
+                };
+                let (count, untimed) = (track.steps.count, track.untimed);
+                let announced = self.announced(track.group);
+                if count + untimed < announced {
+                    let there = count + untimed;
+                    faults.push(format!(
+                        "{prefix}{there} of {announced} announced readings are there"
+                    ));
+                }
+                if untimed > 0 {
+                    faults.push(format!(
+                        "{prefix}{untimed} readings without a time stamp were left out"
+                    ));
+                }
+                gaps_in_words.extend(told.gaps.iter().map(|(from, to)| {
+                    let (long, at) = (convert::rounded(to - from), convert::rounded(*from));
+                    format!("{prefix}gap of {long} s at {at} s")
+                }));
+                if let Some((from, to)) = told.ends {
+                    (first_s, last_s) = (first_s.min(from), last_s.max(to));
+                }
+            }
+        }
+        faults.extend(file.faults());
+        made.faults.extend(faults.iter().map(|what| Fault {
+            column: TIME.to_owned(),
+            start_s: first_s,
+            end_s: last_s,
+            what: what.clone(),
+        }));
+        made.inherit(file.made(), TIME, TIME);
+        let told = faults.into_iter().chain(gaps_in_words);
+        notes.extend(told.map(|fault| format!("fault: {fault}")));
+        (notes, made)
+    }
+}
+
+impl Group {
+    /// Whether its time is the contract's own column.
+    fn keeps(&self) -> bool {
+        matches!(self.time, Some((_, _, true)))
+    }
+}
+
+/// What the rows were written at.
+struct Raster {
+    /// The file's first sample: it becomes 0.
+    start_s: f64,
+    rate_hz: Option<f64>,
+    words: String,
+    /// Of each column.
+    done: Vec<Done>,
+}
+
+/// Where the raster's times come from.
+enum Grid {
+    /// The times of the chosen group.
+    Times,
+    /// A rate, from a time on.
+    Even {
+        first_s: f64,
+        rate_hz: f64,
+        next: usize,
+        rows: usize,
+    },
+}
+
+/// Some times of the raster, and the readings that the chosen group has there where its times are the raster's.
+struct Next {
+    times: Vec<f64>,
+    kept: Vec<Vec<f64>>,
+}
+
+impl Grid {
+    /// The next times within a span; `None` at the end.
+    fn next(&mut self, chosen: &mut Track<'_>, span_s: f64) -> Result<Option<Next>, StreamError> {
+        match self {
+            Self::Times => {
+                while chosen.times.is_empty() {
+                    if !chosen.next()? {
+                        return Ok(None);
+                    }
+                }
+                let first = chosen.times.first().copied().unwrap_or(0.0);
+                let rows = chosen.times.partition_point(|time| time - first <= span_s);
+                let rows = rows.clamp(1, MOST_ROWS.min(chosen.times.len()));
+                let times = chosen.times.drain(..rows).collect();
+                let columns = chosen.columns.iter_mut();
+                let kept = columns.map(|values| values.drain(..rows).collect());
+                Ok(Some(Next {
+                    times,
+                    kept: kept.collect(),
+                }))
+            }
+            Self::Even {
+                first_s,
+                rate_hz,
+                next,
+                rows,
+            } => {
+                let left = rows.saturating_sub(*next);
+                let count = ((span_s * *rate_hz) as usize).clamp(1, MOST_ROWS).min(left);
+                let from = *next;
+                *next += count;
+                let times = (from..*next).map(|k| *first_s + k as f64 / *rate_hz);
+                Ok((count > 0).then(|| Next {
+                    times: times.collect(),
+                    kept: Vec::new(),
+                }))
+            }
+        }
+    }
+}
+
+/// Where the rows go.
+struct Out<'a> {
+    sink: &'a mut dyn RowSink,
+    progress: &'a mut dyn FnMut(u64),
+    rows: u64,
+    /// Empty cells of each column.
+    empty: Vec<u64>,
+}
+
+impl Out<'_> {
+    fn rows(&mut self, columns: &[Vec<f64>]) -> Result<(), StreamError> {
+        let columns_of_channels = columns.iter().skip(1);
+        for (empty, values) in self.empty.iter_mut().zip(columns_of_channels) {
+            *empty += values.iter().filter(|value| value.is_nan()).count() as u64;
+        }
+        self.rows += columns.first().map_or(0, Vec::len) as u64;
+        self.sink.rows(columns)?;
+        (self.progress)(self.rows);
+        Ok(())
+    }
+}
+
+/// The readings of a group as they come.
+struct Track<'a> {
+    file: &'a SourceFile,
+    group: &'a Group,
+    pieces: FilePieces<'a>,
+    /// The channel that is named where its time is out of order.
+    timed: &'a Channel,
+    /// Of each member: factor and offset to SI, and the map's entry.
+    members: Vec<(f64, f64, &'a crate::map::Entry)>,
+    steps: Steps,
+    untimed: u64,
+    /// Readings of each member that are invalid in the file.
+    invalid: Vec<u64>,
+    ended: bool,
+    /// What was read and is needed still: times in s, and the members in SI units.
+    times: Vec<f64>,
+    columns: Vec<Vec<f64>>,
+}
+
+/// The times of a group, gone through.
+struct Seen {
+    steps: Steps,
+    /// Equal where all times are.
+    times_hash: u64,
+}
+
+impl<'a> Track<'a> {
+    /// A pass over some of the channels that a group wants: its time and the first ones.
+    fn new(
+        stream: &'a Stream,
+        file: &'a SourceFile,
+        group: &'a Group,
+        units: &[(f64, f64, String)],
+        wanted: &[usize],
+    ) -> Result<Self, StreamError> {
+        let fail = |reason: &str| Problem::whole(reason).in_file(file.path());
+        let pieces = file.pieces(wanted)?;
+        let pieces = pieces.ok_or_else(|| fail("cannot be read in pieces"))?;
+        let channels = &stream.prepared.channels;
+        let timed = wanted.first().and_then(|&at| channels.get(at));
+        let count = wanted.len() - usize::from(group.time.is_some());
+        let members = group.members.iter().take(count).map(|&place| {
+            let (factor, offset, _) = &units[place];
+            (
+                *factor,
+                *offset,
+                &stream.prepared.roles.assigned[place].entry,
+            )
+        });
+        Ok(Self {
+            file,
+            group,
+            pieces,
+            timed: timed.ok_or_else(|| fail("no channel"))?,
+            members: members.collect(),
+            steps: Steps::default(),
+            untimed: 0,
+            invalid: vec![0; count],
+            ended: false,
+            times: Vec::new(),
+            columns: vec![Vec::new(); count],
+        })
+    }
+
+    fn keeps(&self) -> bool {
+        self.group.keeps()
+    }
+
+    /// Appends the next piece to what is in memory; false at the end.
+    fn next(&mut self) -> Result<bool, StreamError> {
+        let Some(piece) = self.pieces.next() else {
+            self.ended = true;
+            return Ok(false);
+        };
+        let fail = |problem: Problem| problem.in_file(self.file.path());
+        let (times, series) = self.split(piece?).map_err(fail)?;
+        for &time in times.iter().filter(|time| time.is_finite()) {
+            if let Some((_, before)) = self.steps.ends
+                && time <= before
+            {
+                let problem = convert::out_of_order(self.timed, self.steps.count, before, time);
+                return Err(fail(problem).into());
+            }
+            self.steps.next(time);
+        }
+        let missing = times.iter().filter(|time| !time.is_finite()).count();
+        self.untimed += missing as u64;
+        let readings = series.into_iter().zip(&self.members);
+        let told = self.invalid.iter_mut().zip(&mut self.columns);
+        for ((series, &(factor, offset, entry)), (invalid, column)) in readings.zip(told) {
+            let Series {
+                mut values,
+                invalid: flags,
+                ..
+            } = series;
+            *invalid += convert::bring(&mut values, flags, entry, factor, offset);
+            if missing > 0 {
+                let mut timed = times.iter().map(|time| time.is_finite());
+                values.retain(|_| timed.next().unwrap_or(true));
+            }
+            if column.is_empty() {
+                *column = values;
+            } else {
+                column.extend(values);
+            }
+        }
+        self.times
+            .extend(times.into_iter().filter(|time| time.is_finite()));
+        Ok(true)
+    }
+
+    /// Times in s, and the series of the members.
+    fn split(&self, mut piece: Vec<Series>) -> Result<(Vec<f64>, Vec<Series>), Problem> {
+        let delay_s = self.group.delay_s;
+        let times: Vec<f64> = match self.group.time {
+            Some((factor, offset, _)) if !piece.is_empty() => {
+                let time = piece.remove(0).values.into_iter();
+                time.map(|value| factor * value + offset - delay_s)
+                    .collect()
+            }
+            _ => {
                 let times = piece.first().and_then(|series| series.time_s.as_deref());
-                times.cloned().ok_or_else(|| Problem::whole("no time"))?
+                let times = times.ok_or_else(|| Problem::whole("no time"))?;
+                times.iter().map(|time| time - delay_s).collect()
             }
         };
         if let Some(other) = piece.iter().find(|one| one.values.len() != times.len()) {
@@ -239,41 +688,268 @@ impl Stream {
         Ok((times, piece))
     }
 
-    fn notes(
-        &self,
-        file: &SourceFile,
-        steps: &Steps,
-        told: &[(u64, u64)],
-        faults: Vec<String>,
-    ) -> Vec<String> {
-        let Prepared {
-            channels, roles, ..
-        } = &self.prepared;
-        let mut notes = vec![self.prepared.read_as(file)];
-        let rate = steps.rate_hz().map_or("one reading".to_owned(), |rate| {
-            format!("{} Hz", convert::rounded(rate))
-        });
-        let raster = self.prepared.time.raster.as_ref();
-        let raster = raster.or_else(|| roles.assigned.first().map(|one| &one.column));
-        if let Some(raster) = raster {
-            notes.push(format!("{TIME}: times of {raster}, {rate}"));
+    /// Goes through the times alone.
+    fn seen(mut self) -> Result<Seen, StreamError> {
+        let mut hasher = DefaultHasher::new();
+        while self.next()? {
+            for time in self.times.drain(..) {
+                time.to_bits().hash(&mut hasher);
+            }
+            self.columns.iter_mut().for_each(Vec::clear);
         }
-        let units = self.prepared.units().unwrap_or_default();
-        let all = roles.assigned.iter().zip(units).zip(told);
-        for ((one, (_, _, unit)), &(empty, invalid)) in all {
-            let channel = &channels[one.channel];
-            let kept = format!("{rate}, kept");
-            notes.push(convert::column_note(
-                &one.column,
-                channel,
-                &unit,
-                &kept,
-                empty,
-                invalid,
-            ));
+        Ok(Seen {
+            steps: self.steps,
+            times_hash: hasher.finish(),
+        })
+    }
+
+    /// Leaves behind what lies before a time, but for the last reading there, and reads until there is one behind another time.
+    fn go_to(&mut self, from: f64, to: f64) -> Result<(), StreamError> {
+        loop {
+            let before = self.times.partition_point(|&time| time < from);
+            let left = before.saturating_sub(1);
+            self.times.drain(..left);
+            for values in &mut self.columns {
+                values.drain(..left);
+            }
+            let reaches = self.times.last().is_some_and(|&last| last > to);
+            if self.ended || reaches {
+                return Ok(());
+            }
+            self.next()?;
         }
-        let faults = faults.into_iter().chain(file.faults());
-        notes.extend(faults.map(|fault| format!("fault: {fault}")));
-        notes
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::PathBuf;
+    use std::sync::Arc;
+
+    use super::*;
+    use crate::Format;
+    use crate::convert::convert;
+    use crate::source::{Kind, Pieces, Source};
+
+    /// Groups of channels with times of their own, which give so many readings at a time.
+    struct Bench {
+        channels: Vec<Channel>,
+        series: Vec<Series>,
+        piece: usize,
+    }
+
+    impl Source for Bench {
+        fn start_time(&self) -> Option<String> {
+            None
+        }
+
+        fn channels(&self) -> &[Channel] {
+            &self.channels
+        }
+
+        fn read(&mut self, wanted: &[usize]) -> Result<Vec<Series>, Problem> {
+            Ok(wanted.iter().map(|&at| self.series[at].clone()).collect())
+        }
+
+        fn pieces(&self, wanted: &[usize]) -> Result<Option<Pieces<'_>>, Problem> {
+            let wanted = wanted.to_vec();
+            let length = self.series[wanted[0]].values.len();
+            assert!(
+                wanted
+                    .iter()
+                    .all(|&at| self.channels[at].group == self.channels[wanted[0]].group)
+            );
+            let pieces = (0..length).step_by(self.piece).map(move |from| {
+                let range = from..(from + self.piece).min(length);
+                let of = |&at: &usize| {
+                    let one = &self.series[at];
+                    let times = one
+                        .time_s
+                        .as_ref()
+                        .map(|times| times[range.clone()].to_vec());
+                    Series {
+                        time_s: times.map(Arc::new),
+                        values: one.values[range.clone()].to_vec(),
+                        invalid: one
+                            .invalid
+                            .as_ref()
+                            .map(|flags| flags[range.clone()].to_vec()),
+                    }
+                };
+                Ok(wanted.iter().map(of).collect())
+            });
+            Ok(Some(Box::new(pieces)))
+        }
+
+        fn faults(&self) -> Vec<String> {
+            vec!["a block is damaged".to_owned()]
+        }
+    }
+
+    /// Channels of four rates: with gaps, missing and invalid readings, readings without a time, ends that differ, and jitter.
+    fn bench(piece: usize) -> SourceFile {
+        let groups: [(&str, &str, &str, usize, f64, f64); 5] = [
+            ("0", "n", "rad/s", 4000, 400.0, 0.0),
+            ("0", "v", "m/s", 4000, 400.0, 0.0),
+            ("1", "Fx", "kN", 9000, 1000.0, 0.3),
+            ("2", "Fz", "N", 120, 10.0, -1.0),
+            ("3", "T", "°C", 4000, 400.0, 0.0),
+        ];
+        let (mut channels, mut series) = (Vec::new(), Vec::new());
+        for (number, (group, name, unit, count, rate, start)) in groups.into_iter().enumerate() {
+            let mut times: Vec<f64> = (0..count)
+                .map(|k| {
+                    let gap = if group == "1" && k > 4000 { 0.7 } else { 0.0 };
+                    let jitter = if group == "2" {
+                        0.003 * (k as f64).sin()
+                    } else {
+                        0.0
+                    };
+                    start + k as f64 / rate + gap + jitter
+                })
+                .collect();
+            if group == "1" {
+                times[77] = f64::NAN;
+            }
+            let mut values: Vec<f64> = (0..count)
+                .map(|k| (k as f64 * 0.37 * (number + 1) as f64).sin() + k as f64 * 1e-3)
+                .collect();
+            values[count / 3] = f64::NAN;
+            let mut invalid = vec![false; count];
+            invalid[count / 2] = true;
+            channels.push(Channel {
+                group: group.to_owned(),
+                name: name.to_owned(),
+                unit: unit.to_owned(),
+                samples: count as u64 + u64::from(group == "2"),
+                comment: String::new(),
+                kind: Kind::Numeric,
+                is_time: false,
+            });
+            series.push(Series {
+                time_s: Some(Arc::new(times)),
+                values,
+                invalid: Some(invalid),
+            });
+        }
+        let source = Bench {
+            channels,
+            series,
+            piece,
+        };
+        SourceFile::of_source(PathBuf::from("bench"), Format::Mdf4, Box::new(source))
+    }
+
+    #[derive(Default)]
+    struct Rows(Vec<Vec<f64>>, usize);
+
+    impl RowSink for Rows {
+        fn rows(&mut self, columns: &[Vec<f64>]) -> io::Result<()> {
+            self.0.resize(columns.len(), Vec::new());
+            self.1 = self.1.max(columns[0].len());
+            for (all, some) in self.0.iter_mut().zip(columns) {
+                assert_eq!(some.len(), columns[0].len());
+                all.extend(some);
+            }
+            Ok(())
+        }
+    }
+
+    const MAP: &str = "[channels.wheel_speed_rad_s]\nname = \"n\"\n[channels.vehicle_speed_m_s]\nname = \"v\"\n\
+        [channels.drag_force_n]\nname = \"Fx\"\n[channels.normal_force_n]\nname = \"Fz\"\n[channels.temperature]\nname = \"T\"\n";
+
+    #[test]
+    fn what_goes_by_pieces_is_what_is_converted_whole() {
+        let variants = [
+            String::new(),
+            "[time]\nraster = \"normal_force_n\"\n".to_owned(),
+            "[time]\nraster = \"wheel_speed_rad_s\"\n".to_owned(),
+            "[time]\nrate_hz = 50.0\n".to_owned(),
+            "[time]\nrate_hz = 3000.0\nraster = \"normal_force_n\"\n".to_owned(),
+        ];
+        for (variant, delay) in variants.iter().flat_map(|one| [(one, false), (one, true)]) {
+            let mut text = format!("{MAP}{variant}");
+            if delay {
+                text = text.replace(
+                    "name = \"v\"",
+                    "name = \"v\"\ndelay_s = 0.0125\nmethod = \"hold\"",
+                );
+            }
+            let map: Map = toml::from_str(&text).unwrap();
+            let whole = convert(&mut bench(1 << 20), Some(&map)).unwrap();
+            for piece in [1 << 20, 501, 7] {
+                let file = bench(piece);
+                let stream = Stream::of(&file, Some(&map)).unwrap().unwrap();
+                assert_eq!(stream.names(), whole.names);
+                let mut rows = Rows::default();
+                let streamed = stream.run(&file, &mut rows, &mut |_| {}).unwrap();
+                let same = |a: &f64, b: &f64| {
+                    (a.is_nan() && b.is_nan()) || (a - b).abs() <= 1e-9 * b.abs().max(1.0)
+                };
+                for ((name, column), expected) in
+                    whole.names.iter().zip(&rows.0).zip(&whole.columns)
+                {
+                    assert_eq!(column.len(), expected.len(), "{text}{piece}");
+                    let wrong = column.iter().zip(expected).position(|(a, b)| !same(a, b));
+                    assert_eq!(wrong, None, "{name} {piece} {text}");
+                }
+                assert_eq!(streamed.made.resampled.len(), whole.made.resampled.len());
+                for (one, expected) in streamed.made.resampled.iter().zip(&whole.made.resampled) {
+                    assert_eq!(one.column, expected.column);
+                    assert!((one.interval_s / expected.interval_s - 1.0).abs() < 1e-5);
+                }
+                let of_columns = |made: &Made| -> Vec<Fault> {
+                    let faults = made.faults.iter();
+                    faults.filter(|one| one.column != TIME).cloned().collect()
+                };
+                assert_eq!(
+                    of_columns(&streamed.made),
+                    of_columns(&whole.made),
+                    "{text}"
+                );
+                let columns = |notes: &[String]| -> Vec<String> {
+                    let notes = notes.iter();
+                    notes
+                        .filter(|one| !one.starts_with("fault"))
+                        .cloned()
+                        .collect()
+                };
+                assert_eq!(columns(&streamed.notes), columns(&whole.notes));
+                let faults: Vec<&str> = streamed
+                    .made
+                    .faults
+                    .iter()
+                    .filter(|one| one.column == TIME)
+                    .map(|one| one.what.as_str())
+                    .collect();
+                assert_eq!(
+                    faults,
+                    [
+                        "Fx [kN] (group 1): 1 readings without a time stamp were left out",
+                        "Fz [N] (group 2): 120 of 121 announced readings are there",
+                        "a block is damaged",
+                    ]
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn a_raster_far_slower_than_a_channel_holds_only_what_it_needs() {
+        // At 10 Hz beside 1 kHz: rows come in many small portions, not as one that holds all.
+        let map = format!("{MAP}[time]\nrate_hz = 0.5\n");
+        let map: Map = toml::from_str(&map).unwrap();
+        let file = bench(64);
+        let stream = Stream::of(&file, Some(&map)).unwrap().unwrap();
+        let group = stream.groups.iter().find(|one| one.members == [2]).unwrap();
+        let units = stream.prepared.units().unwrap();
+        let mut track = Track::new(&stream, &file, group, &units, &group.wanted).unwrap();
+        let mut most = 0;
+        for k in 0..90 {
+            let time = 0.3 + f64::from(k) * 0.1;
+            track.go_to(time - 0.05, time + 0.05).unwrap();
+            most = most.max(track.times.len());
+        }
+        assert!(most < 100 + 3 * 64, "{most}");
     }
 }

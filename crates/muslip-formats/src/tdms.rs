@@ -6,8 +6,10 @@
 use std::collections::{BTreeMap, HashMap};
 use std::sync::Arc;
 
+use crate::cursor::Cursor;
 use crate::error::Problem;
-use crate::file_bytes::{Cursor, FileBytes, Number};
+use crate::file_bytes::FileBytes;
+use crate::number::Number;
 use crate::source::{Channel, Kind, Series, Source};
 use crate::tdms_property::Property;
 use crate::tdms_scaling::Scaling;

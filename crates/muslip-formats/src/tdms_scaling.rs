@@ -1,12 +1,13 @@
 //! From a TDMS channel's raw values to its readings: the chain of scales in its properties.
 //!
-//! Linear, polynomial, table, sum and difference; those of sensors (thermocouple, RTD, thermistor, strain) are refused by name: a raw voltage passed
-//! off as a temperature would be wrong in silence.
+//! Linear, polynomial, table, sum and difference, and those of sensors; any other is refused by name: a raw voltage passed off as a temperature would
+//! be wrong in silence.
 
 use std::collections::BTreeMap;
 
 use crate::error::Problem;
 use crate::tdms_property::Property;
+use crate::tdms_sensor::Sensor;
 
 /// The input that is the raw value.
 const RAW: u32 = 0xffff_ffff;
@@ -38,6 +39,10 @@ enum Scale {
     Subtract {
         left: u32,
         right: u32,
+    },
+    Sensor {
+        sensor: Sensor,
+        input: u32,
     },
     /// A value of a DAQmx row.
     Scaler(u32),
@@ -135,6 +140,7 @@ impl Scaling {
                 terms.iter().rev().fold(0.0, |sum, term| sum * value + term)
             }),
             Scale::Table { points, input } => mapped(*input, &|value| between(points, value)),
+            Scale::Sensor { sensor, input } => mapped(*input, &|value| sensor.reading(value)),
             Scale::Add { left, right } | Scale::Subtract { left, right } => {
                 let sign = if matches!(scale, Scale::Add { .. }) {
                     1.0
@@ -240,6 +246,14 @@ fn scale(properties: &Properties, index: usize) -> Result<Scale, Problem> {
             right: needed("Subtract_Right_Operand_Input_Source")? as u32,
         },
         "AdvancedAPI" => Scale::Same(input("AdvancedAPI_Input_Source")),
-        other => return Err(Problem::whole(format!("scale {other:?} is not supported"))),
+        other => {
+            let given = |key: &str| number(properties, &format!("{prefix}_{key}"));
+            let sensor = Sensor::of(other, &needed, &given)?;
+            Scale::Sensor {
+                sensor: sensor
+                    .ok_or_else(|| Problem::whole(format!("scale {other:?} is not supported")))?,
+                input: input(&format!("{other}_Input_Source")),
+            }
+        }
     })
 }

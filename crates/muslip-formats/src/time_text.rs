@@ -1,6 +1,7 @@
 //! Dates and times as text.
 
 /// Days from 1970-01-01 to a date of the Gregorian calendar (Hinnant, "chrono-compatible low-level date algorithms").
+#[cfg(feature = "csv")]
 fn days(year: i64, month: i64, day: i64) -> i64 {
     let year = if month <= 2 { year - 1 } else { year };
     let era = year.div_euclid(400);
@@ -10,10 +11,7 @@ fn days(year: i64, month: i64, day: i64) -> i64 {
 }
 
 /// RFC 3339 of nanoseconds since 1970 in UTC, at an offset in minutes from it.
-#[cfg_attr(
-    not(any(feature = "mdf", feature = "tdms")),
-    allow(dead_code, reason = "of formats with a start")
-)]
+#[cfg(any(feature = "mdf", feature = "tdms"))]
 pub(crate) fn rfc3339(nanoseconds: i64, offset_min: i64) -> String {
     const DAY: i64 = 86_400;
     let local = nanoseconds
@@ -51,7 +49,7 @@ pub(crate) fn rfc3339(nanoseconds: i64, offset_min: i64) -> String {
 
 /// A time stamp in s: of the day where it is `hh:mm:ss`, since 1970 where it has a date, whole seconds apart from their fraction so that
 /// differences keep their digits.
-#[cfg_attr(not(feature = "csv"), allow(dead_code, reason = "of text"))]
+#[cfg(feature = "csv")]
 pub(crate) fn stamp(text: &str) -> Option<(i64, f64)> {
     let text = text.trim().trim_end_matches('Z');
     let (date, time) = match text.split_once(['T', ' ']) {
@@ -81,14 +79,14 @@ pub(crate) fn stamp(text: &str) -> Option<(i64, f64)> {
     Some((day * 86_400 + hour * 3600 + minute * 60 + second, fraction))
 }
 
-#[cfg_attr(not(feature = "csv"), allow(dead_code, reason = "of text"))]
+#[cfg(feature = "csv")]
 fn whole(digits: &str) -> Option<i64> {
     let fits = (1..=4).contains(&digits.len()) && digits.bytes().all(|b| b.is_ascii_digit());
     if fits { digits.parse().ok() } else { None }
 }
 
 /// `2026-03-04`, `2026/03/04` or `04.03.2026`; a date that may be read in two ways is none.
-#[cfg_attr(not(feature = "csv"), allow(dead_code, reason = "of text"))]
+#[cfg(feature = "csv")]
 fn date_days(text: &str) -> Option<i64> {
     let separator = ['-', '/', '.'].into_iter().find(|&c| text.contains(c))?;
     let mut parts = text.split(separator);
@@ -106,6 +104,7 @@ fn date_days(text: &str) -> Option<i64> {
 mod tests {
     use super::*;
 
+    #[cfg(feature = "csv")]
     #[test]
     fn stamps_are_seconds_and_what_is_none_is_refused() {
         assert_eq!(stamp("1970-01-02T00:00:01.5Z"), Some((86_401, 0.5)));
@@ -124,6 +123,7 @@ mod tests {
         }
     }
 
+    #[cfg(any(feature = "mdf", feature = "tdms"))]
     #[test]
     fn a_start_is_written_with_its_zone() {
         assert_eq!(

@@ -8,7 +8,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use muslip_diagnose::campaign::{self, How, Resampled};
 use muslip_diagnose::outcome::Fault;
-use muslip_formats::convert;
+use muslip_formats::made;
 use muslip_formats::map::{Map, Method};
 use muslip_formats::raster::{Done, interval_s};
 use rayon::prelude::*;
@@ -109,18 +109,18 @@ fn of_recording(
 ) -> Result<Loaded, InputError> {
     let path = recording.path().to_owned();
     let name = path.display().to_string();
-    let conversion: Vec<Fault> = recording
-        .conversion_faults()
-        .iter()
+    let made: made::Made = recording.made().clone();
+    let conversion: Vec<Fault> = made
+        .faults
+        .into_iter()
         .map(|fault| Fault {
             recording: name.clone(),
-            channel: fault.column.clone(),
+            channel: fault.column,
             start_s: fault.start_s,
             end_s: fault.end_s,
-            what: fault.what.clone(),
+            what: fault.what,
         })
         .collect();
-    let resampled = recording.resampled().to_vec();
     let mut rows = recording.rows(required)?;
     let header = rows.header().clone();
     let mut columns: Vec<Vec<f64>> = vec![Vec::new(); header.names().len()];
@@ -133,7 +133,10 @@ fn of_recording(
                 }
                 let mut loaded = in_order(&path, &header, columns);
                 let step_s = interval_s(&loaded.run.time_s).unwrap_or(f64::INFINITY);
-                let told = resampled.iter().filter_map(|one| brought(one, step_s));
+                // A recording may have lost a column since it was converted.
+                let here = made.resampled.iter();
+                let here = here.filter(|one| header.names().contains(&one.column));
+                let told = here.filter_map(|one| brought(one, step_s));
                 loaded.run.resampled = told.collect();
                 loaded.faults.extend(conversion);
                 return Ok(loaded);
@@ -149,7 +152,7 @@ fn of_recording(
 }
 
 /// What was done to a column, as the engine takes it; nothing where it has as many readings as rows.
-fn brought(one: &convert::Resampled, step_s: f64) -> Option<Resampled> {
+fn brought(one: &made::Resampled, step_s: f64) -> Option<Resampled> {
     let coarser = one.interval_s > COARSER_BY * step_s;
     let how = match one.done {
         Done::Interpolated(Method::Linear) if coarser => How::Interpolated,

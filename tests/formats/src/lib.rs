@@ -204,7 +204,7 @@ pub fn judged(path: &Path, written: &Value) -> Judged {
             Some(Ok(_)) => out.push(format!("{refused} should have been refused")),
             Some(Err(error)) if error.to_string().contains(refused) => {}
             Some(Err(error)) => out.push(format!("{refused} is not named: {error}")),
-            None => {}
+            None => out.push(format!("{refused} is not listed")),
         }
     }
     match written["faults"].as_bool() {

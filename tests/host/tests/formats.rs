@@ -215,6 +215,68 @@ fn a_diagnosis_knows_what_was_measured_less_often_than_it_is_recorded() {
 }
 
 #[test]
+fn a_converted_file_says_the_same_of_resampling_as_its_original() {
+    let scratch = Scratch::with_rig(RIG);
+    scratch.output(&["channels", "--write-map", "map.toml", BENCH]);
+    let map = scratch.read("map.toml");
+    assert!(!map.contains("[time]"), "{map}");
+    // What a diagnosis says of how its recording was made: of the times of its channels, and of its faults.
+    let told = |map: Option<&str>, file: &str| {
+        let mut arguments = words("diagnose --rig rig.toml --out found --json");
+        arguments.extend(map.into_iter().flat_map(|map| ["--map", map]));
+        arguments.push(file);
+        let diagnosis = scratch.json(&arguments);
+        let of = |list: &str, keys: &[&str]| -> Vec<String> {
+            let entries = diagnosis[list].as_array().unwrap().iter();
+            let resampled = entries.filter(|one| {
+                list != "chain"
+                    || ["held", "low_passed"].contains(&one["finding"].as_str().unwrap())
+            });
+            let mut lines: Vec<String> = resampled
+                .map(|one| {
+                    keys.iter()
+                        .map(|key| format!("{key}: {}; ", one[*key]))
+                        .collect()
+                })
+                .collect();
+            lines.sort();
+            lines
+        };
+        let mut all = of(
+            "chain",
+            &["channel", "finding", "value", "unit", "statement"],
+        );
+        all.extend(of("data_faults", &["channel", "start_s", "end_s", "what"]));
+        all
+    };
+    scratch.write("as-it-is.toml", map.clone());
+    scratch.write("at-100.toml", format!("{map}\n[time]\nrate_hz = 100.0\n"));
+    for (map, word) in [("as-it-is.toml", "held"), ("at-100.toml", "low_passed")] {
+        let original = told(Some(map), BENCH);
+        assert!(
+            original
+                .iter()
+                .any(|line| line.contains(&format!("finding: \"{word}\""))),
+            "{original:#?}"
+        );
+        assert!(
+            original
+                .iter()
+                .any(|line| line.contains("what: \"measured at")),
+            "{original:#?}"
+        );
+        for out in ["run.csv", "run.parquet"] {
+            scratch.output(&["convert", "--map", map, "--out", out, BENCH]);
+            assert_eq!(told(None, out), original, "{out}, {map}");
+            // Through a second conversion, which leaves the times as they are.
+            let again = format!("again-{out}");
+            scratch.output(&["convert", "--out", &again, out]);
+            assert_eq!(told(None, &again), original, "{again}, {map}");
+        }
+    }
+}
+
+#[test]
 fn the_fitted_law_is_a_property_file_that_another_tyre_library_reads() {
     let scratch = Scratch::with_rig(RIG);
     scratch.write("lauf.csv", german());

@@ -21,7 +21,7 @@ use super::terminal::Terminal;
 /// Convert a file of any format into a recording: the contract's columns in SI units on one time.
 ///
 /// Channels on other rasters are interpolated between their own readings, never beyond them or across gaps; faster ones are low-passed first. The
-/// recording says how it was made: in comment lines of a CSV, in metadata of Parquet.
+/// recording says how it was made: in comment lines of a CSV, in metadata of Parquet; every command that reads it finds that again.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  \
 muslip convert --out run.csv run.mf4\n  \
@@ -109,9 +109,12 @@ fn whole(arguments: &Arguments, file: &mut SourceFile, map: Option<&Map>) -> Res
     if is_parquet(out) {
         sink = muslip_formats::write_parquet(sink, &converted).map_err(fail)?;
     } else {
-        let mut csv = csv(sink, &converted.notes, &converted.names).map_err(fail)?;
+        let made = &converted.made;
+        let above = [converted.notes.clone(), made.resampled_lines()].concat();
+        let mut csv = csv(sink, &above, &converted.names).map_err(fail)?;
         write_rows(&mut csv, &converted.columns).map_err(fail)?;
         sink = csv.into_inner();
+        write_comments(&mut sink, &made.fault_lines()).map_err(fail)?;
     }
     sink.flush().map_err(fail)?;
     sink.commit()?;
@@ -180,10 +183,12 @@ impl Rows {
             Self::Csv(csv) => {
                 let mut sink = csv.into_inner();
                 write_comments(&mut sink, &streamed.notes)?;
+                write_comments(&mut sink, &streamed.made.resampled_lines())?;
+                write_comments(&mut sink, &streamed.made.fault_lines())?;
                 Ok(sink)
             }
             Self::Parquet(mut table) => {
-                table.note("muslip.read", &streamed.notes.join("\n"));
+                table.note_making(&streamed.notes, &streamed.made);
                 if let Some(start) = &streamed.start_time {
                     table.note("start_time", start);
                 }

@@ -4,7 +4,7 @@ use std::fmt;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use muslip_formats::convert;
+use muslip_formats::made::Made;
 use muslip_formats::roles::Refused;
 
 use super::header::{Channel, Header, Required};
@@ -21,8 +21,7 @@ pub struct Memory {
     pub(super) columns: Vec<SharedColumn>,
     pub(super) rows: usize,
     pub(super) notes: Vec<String>,
-    pub(super) faults: Vec<convert::Fault>,
-    pub(super) resampled: Vec<convert::Resampled>,
+    pub(super) made: Made,
     pub(super) refused: Vec<Refused>,
 }
 
@@ -83,8 +82,7 @@ impl Memory {
             columns,
             rows,
             notes: Vec::new(),
-            faults: Vec::new(),
-            resampled: Vec::new(),
+            made: Made::default(),
             refused: Vec::new(),
         };
         memory.check_time()?;
@@ -130,14 +128,8 @@ impl Memory {
 
     /// What a diagnosis must know of how it was read.
     #[must_use]
-    pub fn faults(&self) -> &[convert::Fault] {
-        &self.faults
-    }
-
-    /// Which columns were measured at other times than the recording's.
-    #[must_use]
-    pub fn resampled(&self) -> &[convert::Resampled] {
-        &self.resampled
+    pub fn made(&self) -> &Made {
+        &self.made
     }
 
     /// Bytes of its values.

@@ -7,6 +7,7 @@ use std::sync::Arc;
 
 use csv::ByteRecord;
 use muslip::sample::RigSample;
+use muslip_formats::made::{COMMENT_BYTES, Made};
 use muslip_formats::map::Map;
 
 use super::header::{Channel, Header, Required};
@@ -34,6 +35,8 @@ enum Source {
         file: File,
         /// Where the text starts: after the byte order mark, if there is one.
         text_start: u64,
+        /// What its comments say of a conversion that it came from.
+        made: Made,
     },
     /// A file in another format than the contract's.
     Table(Table),
@@ -80,7 +83,11 @@ impl Recording {
         let text_start = if start == BYTE_ORDER_MARK { 3 } else { 0 };
         let source = match Table::of(path, &file, text_start, map)? {
             Some(table) => Source::Table(table),
-            None => Source::Text { file, text_start },
+            None => Source::Text {
+                made: made_of(&file, length_bytes).map_err(fail)?,
+                file,
+                text_start,
+            },
         };
         Ok(Self {
             path: path.to_owned(),
@@ -105,13 +112,12 @@ impl Recording {
     /// [`InputError`] as for [`Recording::open_mapped`], [`Recording::rows`] and [`Rows::next_row`]; the drag may be missing.
     pub fn read_whole(path: &Path, map: Option<&Map>) -> Result<Memory, InputError> {
         let mut recording = Self::open_mapped(path, map)?;
-        let (mut notes, mut faults, mut refused) = (Vec::new(), Vec::new(), Vec::new());
+        let (mut notes, mut refused) = (Vec::new(), Vec::new());
         if let Some(converted) = recording.converted() {
             notes.clone_from(&converted.notes);
-            faults.clone_from(&converted.faults);
             refused.clone_from(&converted.refused);
         }
-        let resampled = recording.resampled().to_vec();
+        let made = recording.made().clone();
         let mut rows = recording.rows(Required::DragOptional)?;
         let header = rows.header().clone();
         let mut columns: Vec<Vec<f64>> = vec![Vec::new(); header.names().len()];
@@ -131,8 +137,7 @@ impl Recording {
             columns,
             rows,
             notes,
-            faults,
-            resampled,
+            made,
             refused,
         })
     }
@@ -155,21 +160,12 @@ impl Recording {
         }
     }
 
-    /// What a diagnosis must know of how the columns were made.
-    pub fn conversion_faults(&self) -> &[muslip_formats::convert::Fault] {
+    /// What a diagnosis must know of how the columns were made: of a file of another format, or of one that a recording says it was converted from.
+    pub fn made(&self) -> &Made {
         match &self.source {
-            Source::Text { .. } => &[],
-            Source::Table(table) => &table.converted.faults,
-            Source::Memory(memory) => memory.faults(),
-        }
-    }
-
-    /// Which columns were measured at other times than the recording's.
-    pub fn resampled(&self) -> &[muslip_formats::convert::Resampled] {
-        match &self.source {
-            Source::Text { .. } => &[],
-            Source::Table(table) => &table.converted.resampled,
-            Source::Memory(memory) => memory.resampled(),
+            Source::Text { made, .. } => made,
+            Source::Table(table) => &table.converted.made,
+            Source::Memory(memory) => memory.made(),
         }
     }
 
@@ -277,7 +273,9 @@ impl Recording {
     fn rewound(&self) -> Result<&File, InputError> {
         let fail = |error| InputError::unreadable(&self.path, &error);
         match &self.source {
-            Source::Text { file, text_start } => {
+            Source::Text {
+                file, text_start, ..
+            } => {
                 let mut at = file;
                 at.seek(SeekFrom::Start(*text_start)).map_err(fail)?;
                 Ok(file)
@@ -322,6 +320,20 @@ impl Recording {
             None => InputError::unreadable(&self.path, &error),
         }
     }
+}
+
+/// What the comments of a text say of a conversion that it came from.
+fn made_of(mut file: &File, length_bytes: u64) -> io::Result<Made> {
+    let mut piece = |from: u64| {
+        file.seek(SeekFrom::Start(from))?;
+        let mut bytes = Vec::new();
+        file.take(COMMENT_BYTES).read_to_end(&mut bytes)?;
+        Ok::<_, io::Error>(bytes)
+    };
+    let first = piece(0)?;
+    let last = piece(length_bytes.saturating_sub(COMMENT_BYTES))?;
+    let is_whole = length_bytes <= COMMENT_BYTES;
+    Ok(Made::of_text(&first, &last, is_whole))
 }
 
 /// Where the rows come from.
