@@ -20,7 +20,9 @@ from .. import Map, Progress, RigLike, _Bar
 from .._errors import MuslipError
 from . import _child
 from ._engines import ENGINES
+from ._process import Maps as _Maps
 from ._process import Options, Recording, Unit
+from ._process import Rigs as _Rigs
 from ._results import GROUPS, RECORDINGS, Made, Results, full, made_of
 from ._summary import Summary, summary
 from ._table import groups_of, maps_of, recordings_of, rigs_of
@@ -80,6 +82,8 @@ def process(
     """
     path = os.fspath(path)
     options = Options(range, estimator, diagnose, timeout_s)
+    rigs: _Rigs
+    maps: _Maps
     try:
         rigs = rigs_of(rig, [None])
         maps = maps_of(map, [None])

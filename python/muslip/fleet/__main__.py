@@ -75,7 +75,7 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 if __name__ == "__main__":
-    status = main()
+    status: int = main()
     # spark-submit takes any SystemExit for a failure.
     if status:
         sys.exit(status)
