@@ -91,9 +91,7 @@ def process(
         rigs, maps = {None: error}, {None: None}
     unit = Recording(path)
     asked = Asked.of([unit], rigs, maps, options)
-    row = asked.row_of(unit, None if timeout_s is None else _child.mine(None))
-    assert row is not None
-    return full(row, RECORDINGS)
+    return full(asked.row_of(unit, None if timeout_s is None else _child.mine(None)), RECORDINGS)
 
 
 def run(
