@@ -22,7 +22,7 @@ import fleets
 
 import muslip
 import muslip.fleet
-from muslip.fleet import Counts, _child, _results, _storage, _work, diagnose, process, run, summary
+from muslip.fleet import Counts, _child, _results, _storage, _work, diagnose, process, run, summary, to_delta
 
 
 @pytest.fixture(scope="module")
@@ -312,6 +312,30 @@ def test_storages_are_read_and_written(made, tmp_path, monkeypatch, by):
     assert missing["error"].endswith("none.csv:1:1: cannot be read: no such file or directory")
     assert run(paths[:10], out, rig=rig) == Counts(done=10, skipped=0, failed=0)
     assert run(paths[:10], out, rig=rig) == Counts(done=0, skipped=10, failed=0)
+
+
+def test_a_delta_table_has_the_rows_and_a_version_more_only_where_they_change(made, tmp_path):
+    import deltalake
+
+    rig, paths = made
+    out, table = tmp_path / "results", tmp_path / "table"
+    run(paths[:10], out, rig=rig)
+    assert [to_delta(out, table), to_delta(out, table)] == [0, 0]
+    run(paths, out, rig=rig)
+    command = [sys.executable, "-m", "muslip.fleet", "delta", out, "--table", table]
+    assert subprocess.run(command, capture_output=True, text=True, check=True).stdout == "version 1\n"
+    assert to_delta(out, table) == 1
+    for version, rows in ((0, 10), (1, 40)):
+        there = pyarrow.table(deltalake.DeltaTable(str(table), version=version).to_pyarrow_table())
+        assert sorted(there["path"].to_pylist()) == sorted(paths[:rows])
+    expected = pandas.read_parquet(out).sort_values("path", ignore_index=True)
+    found = there.to_pandas().sort_values("path", ignore_index=True)
+    pandas.testing.assert_frame_equal(found, expected[found.columns])
+    deltalake.write_deltalake(str(tmp_path / "foreign"), pyarrow.table({"path": ["a"]}))
+    for ask in (lambda: to_delta(tmp_path, table), lambda: to_delta(out, tmp_path / "foreign")):
+        with pytest.raises(muslip.MuslipError) as error:
+            ask()
+        assert len(str(error.value).splitlines()) == 1
 
 
 def rows_of(count: int, seed: int = 1) -> pandas.DataFrame:

@@ -19,6 +19,7 @@ from typing import Any, Literal
 from .. import Map, Progress, RigLike, _Bar
 from .._errors import MuslipError
 from . import _child
+from ._delta import to_delta
 from ._engines import ENGINES
 from ._process import Maps as _Maps
 from ._process import Options, Recording, Unit
@@ -28,7 +29,7 @@ from ._summary import Summary, summary
 from ._table import groups_of, maps_of, recordings_of, rigs_of
 from ._work import Asked, Plan
 
-__all__ = ["Counts", "Summary", "diagnose", "process", "run", "summary"]
+__all__ = ["Counts", "Summary", "diagnose", "process", "run", "summary", "to_delta"]
 
 Engine = Literal["pool", "spark", "ray"]
 Rigs = RigLike | Mapping[str, RigLike] | None
