@@ -1,6 +1,6 @@
 from collections.abc import Callable, Sequence
 from os import PathLike
-from typing import Any
+from typing import Any, final
 
 _Path = str | PathLike[str]
 _Map = tuple[bool, str] | None
@@ -8,6 +8,7 @@ _Progress = Callable[[float, str], object] | None
 
 __version__: str
 
+@final
 class Columns:
     @staticmethod
     def of_arrays(name: _Path, names: list[str], arrays: list[Any]) -> Columns: ...
@@ -27,6 +28,7 @@ class Columns:
 
 _Source = Columns | _Path
 
+@final
 class Rig:
     @staticmethod
     def read(path: _Path) -> Rig: ...
@@ -44,6 +46,7 @@ class Rig:
     def whole(self) -> bool: ...
     def json(self) -> str: ...
 
+@final
 class Model:
     @staticmethod
     def read(path: _Path) -> Model: ...
@@ -53,11 +56,13 @@ class Model:
     def text(self) -> str: ...
     def save(self, path: _Path) -> None: ...
 
+@final
 class Estimate:
     json: str
     def trace(self) -> list[tuple[str, bytes]]: ...
     def report_html(self) -> str: ...
 
+@final
 class Diagnosed:
     json: str
     @property
@@ -66,6 +71,7 @@ class Diagnosed:
     def report_html(self) -> str: ...
     def write(self, out: _Path) -> None: ...
 
+@final
 class Estimator:
     def __new__(cls, range: str | None = None, estimator: str | None = None) -> Estimator: ...
     def update(self, slip: float, friction: float, std: float) -> bool: ...

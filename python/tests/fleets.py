@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import os
 import pathlib
+import time
 
 import pyarrow
 import pyarrow.csv
 
 import muslip
+from muslip.fleet import _work
+
+WORKED = _work._worked
 
 RIG = dict(
     radius_m=0.31, inertia_kg_m2=1.25, mass_kg=420.0, torque_per_pressure_nm_pa=3.2e-4, peak_friction=0.85,
@@ -49,3 +53,19 @@ def endless(folder: pathlib.Path) -> str:
     path = folder / "endless.csv"
     os.mkfifo(path)
     return str(path)
+
+
+def squared_or_worse(value):
+    """A square; as negative as that, it ends its process or never comes back."""
+    if value == -1:
+        os.abort()
+    if value == -2:
+        time.sleep(60)
+    return value * value
+
+
+def aborting_on_the_fourth(unit, *work):
+    """What is computed for a row, but for one recording that ends its process."""
+    if unit.key.endswith("run000004.csv"):
+        os.abort()
+    return WORKED(unit, *work)

@@ -88,7 +88,7 @@ class Submission:
                 self.peak_mb[name] = max([self.peak_mb.get(name, 0.0), *map(peak_mb, self.processes(words))])
             time.sleep(0.2)
         printed, _ = self.driver.communicate()
-        assert self.driver.returncode == 0, self.log.read_text()[-4000:]
+        assert self.driver.returncode == 0, f"status {self.driver.returncode}, {printed}\n{self.log.read_text()[-4000:]}"
         found = re.search(r"^done (\d+), skipped (\d+), failed (\d+)$", printed, re.M)
         assert found, printed
         return Counts(*map(int, found.groups()))

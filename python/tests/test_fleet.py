@@ -22,7 +22,7 @@ import fleets
 
 import muslip
 import muslip.fleet
-from muslip.fleet import Counts, _child, _results, _storage, diagnose, process, run, summary
+from muslip.fleet import Counts, _child, _results, _storage, _work, diagnose, process, run, summary, to_delta
 
 
 @pytest.fixture(scope="module")
@@ -113,12 +113,11 @@ def test_a_pool_leaves_a_row_each_and_goes_on(made, tmp_path):
     pathlib.Path(paths[3]).write_bytes(content)
     assert run(paths, out, rig=rig, timeout_s=1.0, range="aircraft") == Counts(done=40, skipped=0, failed=0)
     assert run(paths, out, rig=rig, timeout_s=1.0) == Counts(done=40, skipped=0, failed=0)
-    part = next(out.glob("part-*"))
-    table = pyarrow.parquet.read_table(part)
+    tables = {part: pyarrow.parquet.read_table(part) for part in out.glob("part-*")}
+    part, table = next((part, table) for part, table in tables.items() if set(table["path"].to_pylist()) <= set(paths))
     old = table.set_column(table.column_names.index("version"), "version", [["0.0.1"] * len(table)])
     pyarrow.parquet.write_table(old, part)
-    ours = sum(path in set(paths) for path in table["path"].to_pylist())
-    assert run(paths, out, rig=rig, timeout_s=1.0) == Counts(done=ours, skipped=40 - ours, failed=0)
+    assert run(paths, out, rig=rig, timeout_s=1.0) == Counts(done=len(table), skipped=40 - len(table), failed=0)
     assert without_times(out) == first
 
     assert run(paths, out, rig=rig, timeout_s=1.0, resume=False) == Counts(done=40, skipped=0, failed=0)
@@ -177,6 +176,30 @@ def test_a_child_ends_with_what_hangs_or_aborts_and_another_takes_over():
         os.kill(pid, 0)
     assert child.call(os.getpid, timeout_s=10.0) != pid
     child.close()
+
+
+def test_many_at_once_are_answered_in_order_up_to_the_one_that_fails(monkeypatch):
+    child = _child.Child()
+    assert list(child.each(fleets.squared_or_worse, [(value,) for value in range(1000)])) == [
+        value * value for value in range(1000)
+    ]
+    for worse, error in ((-1, _child.Died), (-2, _child.TooLong)):
+        got = []
+        with pytest.raises(error):
+            for result in child.each(fleets.squared_or_worse, [(2,), (3,), (worse,), (4,)], timeout_s=0.5):
+                got.append(result)
+        # Of a process that has died, what was on its way is lost; who waits long enough has all that was ready.
+        assert got == [4, 9] if error is _child.TooLong else got in ([], [4], [4, 9])
+    child.close()
+
+
+def test_one_that_aborts_among_many_costs_its_row_alone(made, tmp_path, monkeypatch):
+    rig, paths = made
+    monkeypatch.setattr(_work, "_worked", fleets.aborting_on_the_fourth)
+    monkeypatch.setattr(_results, "_FEWEST_PARTS", 1)
+    assert run(paths, tmp_path / "results", rig=rig, workers=1) == Counts(done=39, skipped=0, failed=1)
+    frame = pandas.read_parquet(tmp_path / "results").set_index("path")
+    assert frame.loc[paths[3], "error"] == "error: its process died twice: signal 6"
 
 
 def test_rigs_and_maps_are_joined_by_a_key(made, tmp_path):
@@ -289,6 +312,30 @@ def test_storages_are_read_and_written(made, tmp_path, monkeypatch, by):
     assert missing["error"].endswith("none.csv:1:1: cannot be read: no such file or directory")
     assert run(paths[:10], out, rig=rig) == Counts(done=10, skipped=0, failed=0)
     assert run(paths[:10], out, rig=rig) == Counts(done=0, skipped=10, failed=0)
+
+
+def test_a_delta_table_has_the_rows_and_a_version_more_only_where_they_change(made, tmp_path):
+    import deltalake
+
+    rig, paths = made
+    out, table = tmp_path / "results", tmp_path / "table"
+    run(paths[:10], out, rig=rig)
+    assert [to_delta(out, table), to_delta(out, table)] == [0, 0]
+    run(paths, out, rig=rig)
+    command = [sys.executable, "-m", "muslip.fleet", "delta", out, "--table", table]
+    assert subprocess.run(command, capture_output=True, text=True, check=True).stdout == "version 1\n"
+    assert to_delta(out, table) == 1
+    for version, rows in ((0, 10), (1, 40)):
+        there = pyarrow.table(deltalake.DeltaTable(str(table), version=version).to_pyarrow_table())
+        assert sorted(there["path"].to_pylist()) == sorted(paths[:rows])
+    expected = pandas.read_parquet(out).sort_values("path", ignore_index=True)
+    found = there.to_pandas().sort_values("path", ignore_index=True)
+    pandas.testing.assert_frame_equal(found, expected[found.columns])
+    deltalake.write_deltalake(str(tmp_path / "foreign"), pyarrow.table({"path": ["a"]}))
+    for ask in (lambda: to_delta(tmp_path, table), lambda: to_delta(out, tmp_path / "foreign")):
+        with pytest.raises(muslip.MuslipError) as error:
+            ask()
+        assert len(str(error.value).splitlines()) == 1
 
 
 def rows_of(count: int, seed: int = 1) -> pandas.DataFrame:

@@ -12,12 +12,14 @@ mod image;
 mod latency;
 mod mechanisms;
 mod python;
+mod pythons;
 mod release;
 mod setup;
 mod step;
 mod test;
 mod trial;
 mod what_if;
+mod wheels;
 
 use clap::{Parser, Subcommand};
 
@@ -102,7 +104,17 @@ enum Command {
         large: Option<u64>,
     },
     /// Build the Python package as a wheel, install it, and hold it against the command.
-    Python,
+    Python {
+        /// Instead: the wheels of a release, for manylinux2014 (x86_64, aarch64), Windows and macOS, tested as far as this machine can.
+        #[arg(long, conflicts_with_all = ["versions", "checkout"])]
+        wheels: bool,
+        /// Instead: its tests on the oldest and the newest Python, with the oldest and the newest pandas.
+        #[arg(long, conflicts_with = "checkout")]
+        versions: bool,
+        /// Instead: `pip install ./python` from a checkout of what is committed, into a bare environment.
+        #[arg(long)]
+        checkout: bool,
+    },
     /// A fleet of recordings through Spark's local cluster, against a plain loop, with workers and driver killed: of the Python package.
     Fleet {
         /// Small recordings, which are estimated.
@@ -146,7 +158,10 @@ fn main() -> anyhow::Result<()> {
     match Arguments::parse().command {
         Command::Test => test::run_all(),
         Command::Check => check::run_all(),
-        Command::Python => python::test_alone(),
+        Command::Python { wheels: true, .. } => wheels::build(),
+        Command::Python { versions: true, .. } => pythons::test(),
+        Command::Python { checkout: true, .. } => wheels::from_a_checkout(),
+        Command::Python { .. } => python::test_alone(),
         Command::Fleet {
             recordings,
             diagnoses,

@@ -32,6 +32,11 @@ pub struct Proof {
 
 /// As [`test`], against a command that is built for it.
 pub fn test_alone() -> Result<()> {
+    test(&commanded()?)
+}
+
+/// The command that the package is held against, built.
+pub fn commanded() -> Result<String> {
     run(
         "the command that the package is held against",
         cargo(&[
@@ -43,7 +48,7 @@ pub fn test_alone() -> Result<()> {
             "--locked",
         ]),
     )?;
-    test(&program(&target(), CHECKED, "muslip"))
+    Ok(program(&target(), CHECKED, "muslip"))
 }
 
 /// Builds the wheel, installs it into virtual environments of its own and runs the package's tests there, against this
@@ -60,33 +65,47 @@ pub fn test(muslip: &str) -> Result<()> {
             &["-m", "ruff", "format", "--quiet", "--check", "--no-cache"],
         ),
         ("Python: types", &["-m", "mypy", "--no-error-summary"]),
+        (
+            "Python: types, a second opinion",
+            &["-m", "basedpyright", "--warnings", "--pythonpath", &python],
+        ),
     ] {
         let mut check = command(&python, arguments);
         check
             .arg("muslip")
-            .current_dir(root().join("python"))
+            .current_dir(folder())
             .env("MYPY_CACHE_DIR", target().join("mypy"));
         run(name, check)?;
     }
     let wheel = built(&python, CHECKED)?;
     install(&python, &wheel)?;
-    // Not from the sources, whose folder has the same name and no compiled part.
-    let mut tests = command(
+    // As those see it who use it: the stub against the compiled module, and whether every public type is known.
+    let mut stub = command(&python, &["-m", "mypy.stubtest", "--ignore-disjoint-bases"]);
+    stub.arg("--allowlist")
+        .arg(folder().join("tests/stubtest.txt"))
+        .arg("muslip._native")
+        .current_dir(wheels())
+        .env("MYPY_CACHE_DIR", target().join("mypy"));
+    run("Python: the stub is the compiled module's", stub)?;
+    let mut known = command(
         &python,
         &[
             "-m",
-            "pytest",
-            "--quiet",
-            "-p",
-            "no:cacheprovider",
-            "--import-mode=importlib",
+            "basedpyright",
+            "--verifytypes",
+            "muslip",
+            "--ignoreexternal",
         ],
     );
-    tests
-        .arg(root().join("python/tests"))
-        .current_dir(wheels())
-        .env(COMMAND, muslip);
-    run("tests of the Python package", tests)?;
+    // It looks for packages by the first python of the search path.
+    let path = std::env::var_os("PATH").unwrap_or_default();
+    let first = Path::new(&python).parent().map(Path::to_owned);
+    known.current_dir(wheels()).env(
+        "PATH",
+        std::env::join_paths(first.into_iter().chain(std::env::split_paths(&path)))?,
+    );
+    run("Python: every public type is known", known)?;
+    tested(&python, muslip, &[])?;
     let mut reference = command(
         &python,
         &["-W", "error", "-m", "pdoc", "--docformat", "numpy"],
@@ -97,6 +116,28 @@ pub fn test(muslip: &str) -> Result<()> {
         .current_dir(wheels());
     run("Python: reference", reference)?;
     prove(&wheel, SMALL)
+}
+
+/// Runs the tests of the installed package, against this command.
+pub fn tested(python: &str, muslip: &str, arguments: &[&str]) -> Result<()> {
+    // Not from the sources, whose folder has the same name and no compiled part.
+    let mut tests = command(
+        python,
+        &[
+            "-m",
+            "pytest",
+            "--quiet",
+            "-p",
+            "no:cacheprovider",
+            "--import-mode=importlib",
+        ],
+    );
+    tests
+        .args(arguments)
+        .arg(folder().join("tests"))
+        .current_dir(target())
+        .env(COMMAND, muslip);
+    run("tests of the Python package", tests)
 }
 
 /// `cargo xtask fleet`: the proof on a large fleet, by a wheel that is built as a release is.
@@ -113,7 +154,7 @@ fn prove(wheel: &Path, proof: Proof) -> Result<()> {
     install(&spark, wheel)?;
     let mut proved = command(&spark, &[]);
     proved
-        .arg(root().join("python/tests/proof.py"))
+        .arg(folder().join("tests/proof.py"))
         .args(["--executor", &executor, "--wheel"])
         .arg(wheel)
         .arg("--folder")
@@ -128,9 +169,14 @@ fn prove(wheel: &Path, proof: Proof) -> Result<()> {
     run("a fleet through Spark", proved)
 }
 
+/// The sources.
+pub fn folder() -> PathBuf {
+    root().join("python")
+}
+
 /// The interpreter of the environment that a file of requirements asks for.
-fn environment(name: &str, requirements: &str) -> Result<String> {
-    let python = setup::python_environment(name, &root().join("python").join(requirements))?;
+pub fn environment(name: &str, requirements: &str) -> Result<String> {
+    let python = setup::python_environment(name, &folder().join(requirements))?;
     Ok(python.to_string_lossy().into_owned())
 }
 
@@ -140,7 +186,7 @@ fn wheels() -> PathBuf {
 }
 
 /// The wheel, built anew in a profile.
-fn built(python: &str, profile: &str) -> Result<PathBuf> {
+pub fn built(python: &str, profile: &str) -> Result<PathBuf> {
     let wheels = wheels();
     if wheels.exists() {
         fs::remove_dir_all(&wheels)?;
@@ -159,14 +205,15 @@ fn built(python: &str, profile: &str) -> Result<PathBuf> {
     );
     build
         .arg("--manifest-path")
-        .arg(root().join("python/Cargo.toml"))
+        .arg(folder().join("Cargo.toml"))
         .arg("--out")
         .arg(&wheels);
     run("the wheel", build)?;
     the_wheel(&wheels)
 }
 
-fn install(python: &str, wheel: &Path) -> Result<()> {
+/// Installs a wheel and nothing else.
+pub fn install(python: &str, wheel: &Path) -> Result<()> {
     let mut install = command(
         python,
         &[
@@ -183,8 +230,8 @@ fn install(python: &str, wheel: &Path) -> Result<()> {
     run("install the wheel", install)
 }
 
-/// The one wheel that was built.
-fn the_wheel(folder: &Path) -> Result<PathBuf> {
+/// The one wheel in a folder.
+pub fn the_wheel(folder: &Path) -> Result<PathBuf> {
     let mut wheels = Vec::new();
     for entry in fs::read_dir(folder).context("the folder of the wheel")? {
         let path = entry?.path();

@@ -71,17 +71,34 @@ const SPARK_TOOLS: &[Tool] = &[Tool {
     needed_for: "a fleet of recordings through Spark",
 }];
 
+/// What runs programs of another processor.
+const EMULATION_TOOLS: &[Tool] = &[Tool {
+    program: "qemu-aarch64",
+    package: "qemu-user",
+    needed_for: "running a wheel for aarch64",
+}];
+
 /// The interpreter of a virtual environment below the target folder that has these requirements; made once, and again
 /// where they change.
 pub fn python_environment(name: &str, requirements: &Path) -> Result<PathBuf> {
     Machine::this().tools(PYTHON_TOOLS)?;
-    let wanted =
+    python_environment_by(Path::new("python3"), name, requirements)
+}
+
+/// As [`python_environment`], of this interpreter.
+pub fn python_environment_by(
+    interpreter: &Path,
+    name: &str,
+    requirements: &Path,
+) -> Result<PathBuf> {
+    let pinned =
         fs::read_to_string(requirements).with_context(|| requirements.display().to_string())?;
+    let wanted = format!("# {}\n{pinned}", interpreter.display());
     let environment = target().join("tools").join(name);
     let stamp = environment.join("installed.txt");
     let python = environment.join("bin").join("python");
     if fs::read_to_string(&stamp).ok().as_ref() != Some(&wanted) {
-        let mut make = command("python3", &["-m", "venv", "--clear"]);
+        let mut make = command(&interpreter.to_string_lossy(), &["-m", "venv", "--clear"]);
         make.arg(&environment);
         set_up_step(&format!("make the Python environment {name}"), make)?;
         let mut install = command(
@@ -100,6 +117,24 @@ pub fn python_environment(name: &str, requirements: &Path) -> Result<PathBuf> {
         fs::write(&stamp, &wanted)?;
     }
     Ok(python)
+}
+
+/// The interpreter of a Python, as "3.10": on the search path, or one of pyenv's.
+pub fn python_of(version: &str) -> Result<PathBuf> {
+    let pyenv = std::env::var_os("PYENV_ROOT")
+        .map(PathBuf::from)
+        .or_else(|| Some(PathBuf::from(std::env::var_os("HOME")?).join(".pyenv")));
+    Machine::this().python_of(version, pyenv.as_deref())
+}
+
+/// As [`run_all`], for wheels of another processor.
+pub fn for_emulation() -> Result<()> {
+    Machine::this().tools(EMULATION_TOOLS)
+}
+
+/// Adds what rustup has for this target, where it is not there.
+pub fn rust_target(target: &str) -> Result<()> {
+    Machine::this().targets(&[target])
 }
 
 /// As [`run_all`], for a fleet through Spark.
@@ -157,8 +192,37 @@ impl Machine {
     }
 
     fn set_up(&self, wanted: &[Tool]) -> Result<()> {
-        self.targets()?;
+        self.targets(&TARGETS)?;
         self.tools(wanted)
+    }
+
+    fn python_of(&self, version: &str, pyenv: Option<&Path>) -> Result<PathBuf> {
+        let name = format!("python{version}");
+        let on_path = std::env::split_paths(&self.path).map(|folder| folder.join(&name));
+        let mut of_pyenv: Vec<PathBuf> = pyenv
+            .and_then(|root| fs::read_dir(root.join("versions")).ok())
+            .into_iter()
+            .flatten()
+            .flatten()
+            .map(|entry| entry.path().join("bin").join(&name))
+            .collect();
+        of_pyenv.sort();
+        on_path
+            .chain(of_pyenv)
+            .find(|candidate| {
+                // A shim of pyenv is there and runs nothing.
+                Command::new(candidate)
+                    .args(["-c", "import ensurepip, venv"])
+                    .stderr(std::process::Stdio::null())
+                    .status()
+                    .is_ok_and(|status| status.success())
+            })
+            .with_context(|| {
+                format!(
+                    "no Python {version} that can make virtual environments: install {name} and {name}-venv, or \
+                     `pyenv install {version}`"
+                )
+            })
     }
 
     /// A program of this machine.
@@ -168,7 +232,7 @@ impl Machine {
         command
     }
 
-    fn targets(&self) -> Result<()> {
+    fn targets(&self, wanted: &[&str]) -> Result<()> {
         let Ok(listed) = self
             .command("rustup", &["target", "list", "--installed"])
             .output()
@@ -177,8 +241,9 @@ impl Machine {
             return Ok(());
         };
         let installed = String::from_utf8_lossy(&listed.stdout).into_owned();
-        let missing: Vec<&str> = TARGETS
-            .into_iter()
+        let missing: Vec<&str> = wanted
+            .iter()
+            .copied()
             .filter(|target| !installed.lines().any(|line| line.trim() == *target))
             .collect();
         if missing.is_empty() {
@@ -318,6 +383,25 @@ mod tests {
              apt-get update -q\n\
              apt-get install -q -y --no-install-recommends qemu-system-arm chromium\n"
         );
+    }
+
+    #[test]
+    fn a_python_is_one_that_runs_on_the_path_or_of_pyenv() {
+        // As a shim of pyenv does for a version that is not chosen.
+        let shim = Bare::new(&[("python3.10", "exit 127")]);
+        let root = shim.folder.path().join("pyenv");
+        let error = shim.machine.python_of("3.10", Some(&root)).unwrap_err();
+        assert!(error.to_string().contains("pyenv install 3.10"), "{error}");
+
+        let bin = root.join("versions/3.10.13/bin");
+        fs::create_dir_all(&bin).unwrap();
+        fs::copy("/bin/true", bin.join("python3.10")).unwrap();
+        let found = shim.machine.python_of("3.10", Some(&root)).unwrap();
+        assert_eq!(found, bin.join("python3.10"));
+
+        let whole = Bare::new(&[("python3.10", "")]);
+        let found = whole.machine.python_of("3.10", Some(&root)).unwrap();
+        assert_eq!(found, whole.folder.path().join("python3.10"));
     }
 
     #[test]

@@ -19,14 +19,17 @@ from typing import Any, Literal
 from .. import Map, Progress, RigLike, _Bar
 from .._errors import MuslipError
 from . import _child
+from ._delta import to_delta
 from ._engines import ENGINES
+from ._process import Maps as _Maps
 from ._process import Options, Recording, Unit
+from ._process import Rigs as _Rigs
 from ._results import GROUPS, RECORDINGS, Made, Results, full, made_of
 from ._summary import Summary, summary
 from ._table import groups_of, maps_of, recordings_of, rigs_of
 from ._work import Asked, Plan
 
-__all__ = ["Counts", "Summary", "diagnose", "process", "run", "summary"]
+__all__ = ["Counts", "Summary", "diagnose", "process", "run", "summary", "to_delta"]
 
 Engine = Literal["pool", "spark", "ray"]
 Rigs = RigLike | Mapping[str, RigLike] | None
@@ -80,6 +83,8 @@ def process(
     """
     path = os.fspath(path)
     options = Options(range, estimator, diagnose, timeout_s)
+    rigs: _Rigs
+    maps: _Maps
     try:
         rigs = rigs_of(rig, [None])
         maps = maps_of(map, [None])
@@ -87,9 +92,7 @@ def process(
         rigs, maps = {None: error}, {None: None}
     unit = Recording(path)
     asked = Asked.of([unit], rigs, maps, options)
-    row = asked.row_of(unit, None if timeout_s is None else _child.mine(None))
-    assert row is not None
-    return full(row, RECORDINGS)
+    return full(asked.row_of(unit, None if timeout_s is None else _child.mine(None)), RECORDINGS)
 
 
 def run(

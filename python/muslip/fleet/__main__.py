@@ -7,7 +7,7 @@ import sys
 from typing import Any
 
 from muslip import MuslipError
-from muslip.fleet import diagnose, run, summary
+from muslip.fleet import diagnose, run, summary, to_delta
 
 
 def _table(path: str) -> Any:
@@ -43,6 +43,9 @@ def _arguments() -> argparse.ArgumentParser:
     whole.add_argument("results", help="the data set of run")
     whole.add_argument("--diagnoses", help="the data set of diagnose")
     whole.add_argument("--report", required=True, help="the page")
+    delta = commands.add_parser("delta", help="the data set as a Delta table")
+    delta.add_argument("results", help="the data set of run or diagnose")
+    delta.add_argument("--table", required=True, help="folder of the table")
     return parser
 
 
@@ -56,6 +59,9 @@ def main(arguments: list[str] | None = None) -> int:
             found.report(given.report)
             print(f"peak friction {found.peak_friction}, critical slip {found.critical_slip}")
             print(f"{found.estimated} of {found.recordings} recordings, {len(found.outliers)} estimates that stand out")
+            return 0
+        if given.command == "delta":
+            print(f"version {to_delta(given.results, given.table)}")
             return 0
         if bool(given.recordings) == bool(given.table):
             parser.error("either recordings or --table")
@@ -75,7 +81,7 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 if __name__ == "__main__":
-    status = main()
+    status: int = main()
     # spark-submit takes any SystemExit for a failure.
     if status:
         sys.exit(status)

@@ -1,4 +1,8 @@
-"""A process that works on one recording at a time, and can be ended: what hangs, aborts or is killed costs one row and no job."""
+"""A process that works on one recording at a time, and can be ended: what hangs, aborts or is killed costs one row and no job.
+
+It is given many at once and answers with whatever is ready every few milliseconds: to hand over one small recording at a time
+costs as much as to estimate it.
+"""
 
 from __future__ import annotations
 
@@ -11,10 +15,14 @@ import struct
 import subprocess
 import sys
 import threading
-from collections.abc import Callable
+import time
+from collections.abc import Callable, Iterator, Sequence
 from typing import IO, Any
 
 _HEAD = struct.Struct("<Q")
+
+_ANSWER_S = 0.02
+"""How long results wait for more of them, before they are sent together."""
 
 
 class TooLong(Exception):
@@ -22,7 +30,7 @@ class TooLong(Exception):
 
 
 class Died(Exception):
-    """The process of the work ended without an answer."""
+    """The process of the work ended without an answer: on the first item without a result, or on one soon after."""
 
 
 def _send(stream: IO[bytes], value: object) -> None:
@@ -96,21 +104,47 @@ class Child:
         Died
             Its process ended.
         """
+        (answer,) = self.each(function, [arguments], timeout_s=timeout_s)
+        return answer
+
+    def each(
+        self, function: Callable[..., Any], items: Sequence[tuple[object, ...]], *common: object, timeout_s: float | None = None
+    ) -> Iterator[Any]:
+        """What a function answers there for one item after the other, as soon as it is known; ``common`` follows on each.
+
+        Raises
+        ------
+        TooLong
+            The first item without a result took longer than ``timeout_s``; its process is ended.
+        Died
+            Its process ended.
+        """
         process = self._process or self._start()
         assert process.stdin is not None
+        answered = 0
         try:
-            _send(process.stdin, (function, arguments))
-            is_answer, answer = self._answers.get(timeout=timeout_s)
+            _send(process.stdin, (function, items, common))
+            while answered < len(items):
+                # Results wait for each other, and for their turn.
+                wait_s = None if timeout_s is None else timeout_s + 4.0 * _ANSWER_S
+                is_answer, results = self._answers.get(timeout=wait_s)
+                if not is_answer:
+                    raise self._died(process)
+                answered += len(results)
+                yield from results
         except queue.Empty:
-            self.close()
             raise TooLong from None
         except OSError:
-            is_answer, answer = False, None
-        if not is_answer:
-            code = process.wait()
-            self.close()
-            raise Died(f"signal {-code}" if code < 0 else f"status {code}")
-        return answer
+            raise self._died(process) from None
+        finally:
+            if answered < len(items):
+                # Whatever it is at, nobody waits for it.
+                self.close()
+
+    def _died(self, process: subprocess.Popen[bytes]) -> Died:
+        code = process.wait()
+        self.close()
+        return Died(f"signal {-code}" if code < 0 else f"status {code}")
 
     def close(self) -> None:
         """End it."""
@@ -156,6 +190,48 @@ def serve() -> None:
     threading.Thread(target=listen, daemon=True).start()
     # So that no recording is charged with the start.
     _send(answers, None)
+    told = _Told(answers)
     while True:
-        function, arguments = waiting.get()
-        _send(answers, function(*arguments))
+        function, items, common = waiting.get()
+        for item in items:
+            told.add(function(*item, *common))
+        told.now()
+
+
+class _Told:
+    """Results on their way to who asked, several together."""
+
+    def __init__(self, stream: IO[bytes]) -> None:
+        self._stream = stream
+        self._lock = threading.Condition()
+        self._ready: list[Any] = []
+        self._since_s = 0.0
+        # The next item may take its time, and computes without Python's lock.
+        threading.Thread(target=self._watch, daemon=True).start()
+
+    def add(self, result: Any) -> None:
+        with self._lock:
+            self._ready.append(result)
+            if len(self._ready) == 1:
+                self._since_s = time.monotonic()
+                self._lock.notify()
+            elif time.monotonic() - self._since_s > _ANSWER_S:
+                self._send()
+
+    def now(self) -> None:
+        with self._lock:
+            self._send()
+
+    def _send(self) -> None:
+        if self._ready:
+            ready, self._ready = self._ready, []
+            _send(self._stream, ready)
+
+    def _watch(self) -> None:
+        while True:
+            with self._lock:
+                self._lock.wait_for(lambda: self._ready)
+            time.sleep(_ANSWER_S)
+            with self._lock:
+                if time.monotonic() - self._since_s > _ANSWER_S:
+                    self._send()

@@ -59,8 +59,8 @@ def here(part: Part, plan: Plan) -> int:
 
 def spark(parts: list[Part], plan: Plan, told: Told, session: Any = None) -> None:
     """Apache Spark: recordings by ``mapInPandas``, groups by ``applyInPandas``. Workers need pandas, pyarrow and this package."""
-    from pyspark import cloudpickle
-    from pyspark.sql import SparkSession
+    from pyspark import cloudpickle  # pyright: ignore[reportMissingImports]
+    from pyspark.sql import SparkSession  # pyright: ignore[reportMissingImports]
 
     from . import _spark
 
@@ -92,7 +92,7 @@ def _tasks(parts: list[Part], session: Any) -> int:
 
 def ray(parts: list[Part], plan: Plan, told: Told) -> None:
     """Ray: a task a part. Workers need pyarrow and this package."""
-    import ray
+    import ray  # pyright: ignore[reportMissingImports]
 
     is_own = not ray.is_initialized()
     if is_own:

@@ -20,7 +20,7 @@ def _answered(packed: bytes, asked: pandas.DataFrame) -> pandas.DataFrame:
     import pickle
     import sys
 
-    from pyspark import SparkFiles
+    from pyspark import SparkFiles  # pyright: ignore[reportMissingImports]
 
     archive = os.path.join(SparkFiles.getRootDirectory(), ARCHIVE)
     if os.path.isdir(archive) and archive not in sys.path:

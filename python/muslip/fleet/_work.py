@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import time
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 import muslip
@@ -42,17 +42,35 @@ class Asked:
         """The hash of what else than recording and version decides its row."""
         return self.settings[unit.members[0].rig, unit.members[0].map]
 
-    def row_of(self, unit: Unit, child: _child.Child | None, known: str | None = None) -> Row | None:
-        """Its row, by a child where there is one, else worked out here; ``None`` where its fingerprint is the ``known`` one."""
-        first = unit.members[0]
-        rig, map = self.rigs[first.rig], self.maps[first.map]
+    def work_of(self, unit: Unit, known: str | None = None) -> Work:
+        """What is to be computed for its row, where its fingerprint is not the ``known`` one."""
         if len({self.settings[one.rig, one.map] for one in unit.members}) > 1:
-            rig = MuslipError(f"error: {unit.key}: recordings of several rigs or maps: group by rig as well")
-        work = (unit, rig, map, self.options, known)
-        result = computed(*work) if child is None else _guarded(child, work, self.options.timeout_s)
-        if result is None:
-            return None
+            return unit, MuslipError(f"error: {unit.key}: recordings of several rigs or maps: group by rig as well"), known
+        return unit, None, known
+
+    def needed_by(self, units: Iterable[Unit]) -> tuple[Rigs, Maps, Options]:
+        """The rigs and maps of these alone, and the options."""
+        first = [unit.members[0] for unit in units]
+        return {one.rig: self.rigs[one.rig] for one in first}, {one.map: self.maps[one.map] for one in first}, self.options
+
+    def made(self, unit: Unit, result: Row) -> Row:
+        """The whole row of a result."""
         return {"version": self.version, "settings": self.settings_of(unit), **unit.labels(), **result}
+
+    def row_of(self, unit: Unit, child: _child.Child | None) -> Row:
+        """Its row, by a child where there is one, else worked out here."""
+        work, needed = self.work_of(unit), self.needed_by([unit])
+        result = _worked(*work, *needed) if child is None else next(_guarded(child, [work], needed))
+        assert result is not None
+        return self.made(unit, result)
+
+
+Work = tuple[Unit, MuslipError | None, str | None]
+
+
+def _worked(unit: Unit, wrong: MuslipError | None, known: str | None, rigs: Rigs, maps: Maps, options: Options) -> Row | None:
+    first = unit.members[0]
+    return computed(unit, wrong or rigs[first.rig], maps[first.map], options, known)
 
 
 @dataclass(frozen=True)
@@ -66,23 +84,35 @@ class Plan:
     """Where relative paths begin."""
 
 
-def _guarded(child: _child.Child, work: tuple[object, ...], timeout_s: float | None) -> Row | None:
-    start = time.perf_counter()
-    died = ""
-    for _ in range(2):
+def _guarded(child: _child.Child, works: list[Work], needed: tuple[Rigs, Maps, Options]) -> Iterator[Row | None]:
+    """The result of one after the other, by a child; a row as well where it takes too long, or its process dies of it."""
+    timeout_s = needed[2].timeout_s
+    left = list(works)
+    is_alone, deaths = False, 0
+    while left:
+        start = time.perf_counter()
+        given = left[:1] if is_alone else list(left)
         try:
-            row: Row | None = child.call(computed, *work, timeout_s=timeout_s)
-            return row
+            for result in child.each(_worked, given, *needed, timeout_s=timeout_s):
+                del left[0]
+                deaths = 0
+                yield result
+                start = time.perf_counter()
+            continue
         except _child.TooLong:
-            result: Row = {"error": f"error: took longer than {timeout_s:g} s"}
+            failed: Row = {"error": f"error: took longer than {timeout_s:g} s"}
             with contextlib.suppress(_child.TooLong, _child.Died):
                 # It would again: a result, with the time that it may take among its settings.
-                result["fingerprint"] = child.call(fingerprint_of, work[0], timeout_s=timeout_s)
-            return result | {"seconds": time.perf_counter() - start}
+                failed["fingerprint"] = child.call(fingerprint_of, left[0][0], timeout_s=timeout_s)
         except _child.Died as error:
-            # Once more: whoever was killed from outside is not at fault.
-            died = str(error)
-    return {"error": f"error: its process died twice: {died}", "seconds": time.perf_counter() - start}
+            # Once more, and one at a time: who was killed from outside is not at fault, nor is who came before the one that is.
+            is_alone, deaths = True, deaths + 1
+            if deaths < 2:
+                continue
+            failed = {"error": f"error: its process died twice: {error}"}
+        del left[0]
+        deaths = 0
+        yield failed | {"seconds": time.perf_counter() - start}
 
 
 def work_on(part: Part, plan: Plan, child: _child.Child) -> int:
@@ -95,17 +125,22 @@ def work_on(part: Part, plan: Plan, child: _child.Child) -> int:
     name, units = part
     rows = plan.results.rows(name)
     written, is_changed = time.monotonic(), False
+    works = []
     for unit in units:
         before = rows.get(unit.key)
         made = (plan.asked.version, plan.asked.settings_of(unit))
-        known = before["fingerprint"] if before and plan.resume and (before["version"], before["settings"]) == made else None
-        row = plan.asked.row_of(unit, child, known)
-        if row is None and before is not None:
+        is_known = before is not None and plan.resume and (before["version"], before["settings"]) == made
+        works.append(plan.asked.work_of(unit, before["fingerprint"] if before is not None and is_known else None))
+    for unit, result in zip(units, _guarded(child, works, plan.asked.needed_by(units)), strict=True):
+        before = rows.get(unit.key)
+        if result is not None:
+            row = plan.asked.made(unit, result)
+        else:
+            assert before is not None
             row = {**before, **unit.labels()}
-        if row is not None:
-            row = full(row, plan.results.schema)
-            is_changed |= row != before
-            rows[unit.key] = row
+        row = full(row, plan.results.schema)
+        is_changed |= row != before
+        rows[unit.key] = row
         if is_changed and time.monotonic() - written > FLUSH_S:
             plan.results.write(name, rows.values())
             written, is_changed = time.monotonic(), False
