@@ -7,7 +7,10 @@ Everything printed is measured; what does not hold ends it with an error.
 from __future__ import annotations
 
 import argparse
+import concurrent.futures
 import contextlib
+import json
+import multiprocessing
 import os
 import pathlib
 import re
@@ -17,7 +20,8 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
+from dataclasses import dataclass
 
 import pandas
 import pyspark
@@ -28,6 +32,12 @@ import fleets
 import muslip
 from muslip.fleet import Counts, run
 
+# Of the machine, not of what is run: this is over before a second compiler pays, and nobody looks at Spark's page.
+DEFAULTS = """\
+spark.driver.extraJavaOptions -XX:TieredStopAtLevel=1 -XX:+UseSerialGC
+spark.executor.extraJavaOptions -XX:TieredStopAtLevel=1 -XX:+UseSerialGC
+spark.ui.enabled false
+"""
 REPOSITORY = pathlib.Path(__file__).parents[2]
 CORES = 2
 RATIO = 0.8
@@ -35,6 +45,18 @@ RATIO = 0.8
 FEWEST_TO_MEASURE = 10_000
 """Fewer are over before Spark is warm."""
 EXECUTOR = "CoarseGrainedExecutorBackend"
+SEVERAL = """
+import json, sys, time
+from pyspark.sql import SparkSession
+from muslip.fleet.__main__ import main
+session = SparkSession.builder.appName("muslip fleet").getOrCreate()
+for words in json.loads(sys.argv[1]):
+    start = time.monotonic()
+    assert main(words) == 0
+    print(f"took {time.monotonic() - start:.1f} s")
+session.stop()
+"""
+"""Several commands in one session, whose start is half a minute of the processor."""
 LOOP = """
 import sys, time
 import muslip
@@ -71,27 +93,30 @@ class Submission:
 
     def __init__(self, arguments: list[str], folder: pathlib.Path, executor: str) -> None:
         environment = {
-            **os.environ, "PYSPARK_PYTHON": executor, "PYSPARK_DRIVER_PYTHON": sys.executable, "SPARK_LOCAL_IP": "127.0.0.1",
+            **os.environ, "SPARK_CONF_DIR": str(folder / "conf"), "SPARK_LOCAL_IP": "127.0.0.1",
+            "PYSPARK_PYTHON": executor, "PYSPARK_DRIVER_PYTHON": sys.executable,
             "PATH": os.pathsep.join([os.path.dirname(sys.executable), os.environ["PATH"]]),
         }  # fmt: skip
         self.log = folder / "spark.log"
         self.peak_mb: dict[str, float] = {}
+        self.took_s: list[float] = []
         with self.log.open("ab") as log:
             self.driver = subprocess.Popen(
                 arguments, cwd=folder, env=environment, stdout=subprocess.PIPE, stderr=log, text=True, start_new_session=True,
             )  # fmt: skip
 
-    def counts(self) -> Counts:
-        """Wait for its end; what it counted."""
+    def counts(self) -> list[Counts]:
+        """Wait for its end; what its commands counted."""
         while self.driver.poll() is None:
             for name, words in PROCESSES.items():
                 self.peak_mb[name] = max([self.peak_mb.get(name, 0.0), *map(peak_mb, self.processes(words))])
             time.sleep(0.2)
         printed, _ = self.driver.communicate()
         assert self.driver.returncode == 0, f"status {self.driver.returncode}, {printed}\n{self.log.read_text()[-4000:]}"
-        found = re.search(r"^done (\d+), skipped (\d+), failed (\d+)$", printed, re.M)
+        self.took_s = [float(seconds) for seconds in re.findall(r"^took ([\d.]+) s$", printed, re.M)]
+        found = re.findall(r"^done (\d+), skipped (\d+), failed (\d+)$", printed, re.M)
         assert found, printed
-        return Counts(*map(int, found.groups()))
+        return [Counts(*map(int, counts)) for counts in found]
 
     def processes(self, words: str) -> list[int]:
         """Those of its processes whose command line has these words."""
@@ -126,6 +151,15 @@ def timed(name: str) -> Iterator[list[float]]:
     say(f"{name}: {taken[0]:.1f} s")
 
 
+def made(folder: pathlib.Path, count: int, **of: float) -> list[str]:
+    """As many recordings, by all cores."""
+    share = -(-count // CORES)
+    counts = [min(share, count - first) for first in range(0, count, share)]
+    with concurrent.futures.ProcessPoolExecutor(CORES, multiprocessing.get_context("spawn")) as pool:
+        of_each = [pool.submit(fleets.small, folder, some, 1 + index * share, **of) for index, some in enumerate(counts)]
+        return [path for one in of_each for path in one.result()]
+
+
 def loop(rig: pathlib.Path, paths: list[str]) -> float:
     """Recordings a second a core of a plain loop over `process`, on as many cores at once as Spark has."""
     loops = []
@@ -156,15 +190,59 @@ def check(name: str, out: pathlib.Path, paths: list[str], failed: int, counts: C
     say(f"{name}: {len(paths)} asked, {rows}; {counts}")
 
 
-def faults(folder: pathlib.Path, submit: Callable[..., Submission], paths: list[str]) -> None:
-    """A corrupt file, one that never ends, an executor killed in mid-run, the driver killed, and the run begun again."""
+@dataclass(frozen=True)
+class Cluster:
+    """A folder with a rig and recordings, and who is submitted there."""
+
+    folder: pathlib.Path
+    executor: str
+
+    def readme(self) -> Submission:
+        """The README's line as it stands."""
+        return Submission(submitted(), self.folder, self.executor)
+
+    def words(self, pattern: str, out: str, command: str = "run", *more: str) -> list[str]:
+        """The command of the README's line, of others."""
+        return [command, pattern, "--rig", "rig.toml", "--out", out, "--engine", "spark", *more]
+
+    def submit(self, *words: str) -> Submission:
+        """The README's line with another command."""
+        line = submitted()
+        return Submission([*line[: line.index("run")], *words], self.folder, self.executor)
+
+    def submit_all(self, commands: list[list[str]]) -> Submission:
+        """As many commands in one session."""
+        line = submitted()
+        (self.folder / "several.py").write_text(SEVERAL)
+        script = [*line[: line.index("run") - 1], "several.py", json.dumps(commands)]
+        return Submission(script, self.folder, self.executor)
+
+
+def start_ray() -> None:
+    """Ray gives its node half a minute to start, in which a busy machine may not have come to it."""
+    import ray
+
+    for attempts_left in (2, 1, 0):
+        try:
+            ray.init(num_cpus=CORES)
+            return
+        except Exception:
+            ray.shutdown()
+            if attempts_left == 0:
+                raise
+
+
+def faults(cluster: Cluster, paths: list[str], diagnoses: int) -> None:
+    """A corrupt file, one that never ends, an executor killed in mid-run, the driver killed, the run begun again; diagnoses."""
+    folder = cluster.folder
     torn = folder / "torn.csv"
     shutil.copy(folder / paths[0], torn)
     fleets.corrupt(str(torn))
     asked = [*paths, "torn.csv", os.path.basename(fleets.endless(folder))]
     pandas.DataFrame({"path": asked}).to_csv(folder / "faults.csv", index=False)
     out = folder / "results-faults"
-    first = submit("--table=faults.csv", "results-faults", "run", "--timeout", "2")
+    words = cluster.words("--table=faults.csv", "results-faults", "run", "--timeout", "2")
+    first = cluster.submit(*words)
 
     def wait_for(share: float) -> None:
         while there(out) < share * whole:
@@ -180,11 +258,21 @@ def faults(folder: pathlib.Path, submit: Callable[..., Submission], paths: list[
     before = pandas.read_parquet(out)
     assert 0 < len(before) < len(asked) and before["path"].is_unique
     say(f"killed: 1 of {len(executors)} executors, then the driver; {len(before)} of {len(asked)} rows were there")
-    counts = submit("--table=faults.csv", "results-faults", "run", "--timeout", "2").counts()
-    check("begun again", out, asked, 2, counts)
-    assert counts.skipped == before["fingerprint"].notna().sum()
+
+    longer = made(folder / "longer", 3 * diagnoses, rate_hz=250.0, duration_s=2.0)
+    groups = [f"tyre-{index // 3:05}" for index in range(len(longer))]
+    pandas.DataFrame({"path": [os.path.relpath(path, folder) for path in longer], "tyre": groups}).to_csv(
+        folder / "groups.csv", index=False
+    )
+    both = cluster.submit_all([words, cluster.words("--table=groups.csv", "diagnoses", "diagnose", "--by", "tyre")])
+    again, diagnosed = both.counts()
+    check("begun again", out, asked, 2, again)
+    assert again.skipped == before["fingerprint"].notna().sum()
     frame = pandas.read_parquet(out).set_index("path")
     say("\n".join(f"  {path}: {frame.loc[path, 'error']}" for path in asked[-2:]))
+    say(f"{diagnoses} diagnoses of three recordings each: {both.took_s[1]:.1f} s")
+    check("diagnoses", folder / "diagnoses", sorted(set(groups)), 0, diagnosed)
+
     # The same run by a pool: it finds Spark's rows.
     with contextlib.chdir(folder):
         counts = run({"path": asked}, out, rig="rig.toml", timeout_s=2.0)
@@ -193,7 +281,10 @@ def faults(folder: pathlib.Path, submit: Callable[..., Submission], paths: list[
     # And by Ray, a few anew.
     os.environ |= {"RAY_AUTH_MODE": "disabled", "RAY_USAGE_STATS_ENABLED": "0"}
     few = [str(folder / path) for path in [*paths[:50], "torn.csv"]]
-    check("by Ray", folder / "results-ray", few, 1, run(few, folder / "results-ray", engine="ray", rig=folder / "rig.toml"))
+    start_ray()
+    with timed("by Ray"):
+        counts = run(few, folder / "results-ray", engine="ray", rig=folder / "rig.toml")
+    check("by Ray", folder / "results-ray", few, 1, counts)
 
 
 def main() -> None:
@@ -210,27 +301,23 @@ def main() -> None:
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
     (folder / "python").symlink_to(REPOSITORY / "python")
+    (folder / "conf").mkdir()
+    (folder / "conf" / "spark-defaults.conf").write_text(DEFAULTS)
     shutil.copy(given.wheel, folder / "muslip.zip")
     rig = fleets.rig(folder)
     versions = f"pyspark {pyspark.__version__}, pandas {pandas.__version__}, {sys.version.split()[0]}"
     say(f"muslip {muslip.__version__}, {versions}, {CORES} cores")
 
-    def submit(pattern: str, out: str, command: str = "run", *more: str) -> Submission:
-        words = submitted()
-        at = words.index("run")
-        return Submission(
-            [*words[:at], command, pattern, "--rig", "rig.toml", "--out", out, "--engine", "spark", *more], folder, executor
-        )
+    cluster = Cluster(folder, executor)
 
     with timed(f"{given.recordings} small recordings made"):
-        paths = fleets.small(folder / "runs", given.recordings)
+        paths = made(folder / "runs", given.recordings)
     size = sum(os.path.getsize(path) for path in paths) / len(paths)
     relative = [os.path.relpath(path, folder) for path in paths]
 
-    # The README's line as it stands.
     with timed("spark-submit, all of it") as whole:
-        submission = Submission(submitted(), folder, executor)
-        counts = submission.counts()
+        submission = cluster.readme()
+        (counts,) = submission.counts()
     say("most memory of one: " + ", ".join(f"{name} {peak:.0f} MB" for name, peak in submission.peak_mb.items()))
     ours = [path for path in relative if path.endswith(".csv")]
     check("the README's line", folder / "results", ours, 0, counts)
@@ -243,17 +330,17 @@ def main() -> None:
         started = len(ours) / whole[0] / CORES
         ratios.append(spark / rate)
         rates = f"loop {rate:.1f}, Spark {spark:.1f}, ratio {spark / rate:.2f}"
-        say(f"small recordings of {size / 1024:.1f} kB, a second a core: {rates}")
+        say(f"small recordings of {size / 1024:.1f} kB, a second a core: {rates}; load {os.getloadavg()[0]:.0f}")
         say(f"with Spark's start {started:.1f}, ratio {started / rate:.2f}")
 
-    faults(folder, submit, relative[:10_000])
+    faults(cluster, relative[:10_000], given.diagnoses)
 
     if given.large:
         with timed(f"{given.large} large recordings made"):
-            large = fleets.small(folder / "large", given.large, rate_hz=1000.0, duration_s=60.0)
+            large = made(folder / "large", given.large, rate_hz=1000.0, duration_s=60.0)
         size = sum(os.path.getsize(path) for path in large) / len(large)
         with timed("spark-submit, all of it"):
-            counts = submit("large/*", "results-large").counts()
+            (counts,) = cluster.submit(*cluster.words("large/*", "results-large")).counts()
         check("large", folder / "results-large", [os.path.relpath(path, folder) for path in large], 0, counts)
         written = sorted(path.stat().st_mtime for path in (folder / "results-large").glob("part-*"))
         seconds = pandas.read_parquet(folder / "results-large")["seconds"]
@@ -261,17 +348,7 @@ def main() -> None:
         spark = given.large / (written[-1] - written[0] + seconds.mean()) / CORES
         ratios.append(spark / rate)
         rates = f"loop {rate:.2f}, Spark {spark:.2f}, ratio {spark / rate:.2f}"
-        say(f"large recordings of {size / 2**20:.1f} MB, a second a core: {rates}")
-
-    if given.diagnoses:
-        longer = fleets.small(folder / "longer", 3 * given.diagnoses, rate_hz=250.0, duration_s=2.0)
-        groups = [f"tyre-{index // 3:05}" for index in range(len(longer))]
-        pandas.DataFrame({"path": [os.path.relpath(path, folder) for path in longer], "tyre": groups}).to_csv(
-            folder / "groups.csv", index=False
-        )
-        with timed(f"{given.diagnoses} diagnoses of three recordings each, spark-submit, all of it"):
-            counts = submit("--table=groups.csv", "diagnoses", "diagnose", "--by", "tyre").counts()
-        check("diagnoses", folder / "diagnoses", sorted(set(groups)), 0, counts)
+        say(f"large recordings of {size / 2**20:.1f} MB, a second a core: {rates}; load {os.getloadavg()[0]:.0f}")
 
     assert all(ratio >= RATIO for ratio in ratios), f"a core does less than {RATIO} of a loop's"
 

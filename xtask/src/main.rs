@@ -105,7 +105,7 @@ enum Command {
     },
     /// Build the Python package as a wheel, install it, and hold it against the command.
     Python {
-        /// Instead: the wheels of a release, for manylinux2014 (x86_64, aarch64), Windows and macOS, tested as far as this machine can.
+        /// Instead: the wheels of a release for manylinux2014 (x86_64, aarch64), looked at from outside and tested, the other one emulated.
         #[arg(long, conflicts_with_all = ["versions", "checkout"])]
         wheels: bool,
         /// Instead: its tests on the oldest and the newest Python, with the oldest and the newest pandas.

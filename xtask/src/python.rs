@@ -1,5 +1,6 @@
 //! `cargo xtask python`: the Python package as a wheel, installed and held against the command.
 
+use std::ffi::OsString;
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -11,6 +12,9 @@ use crate::trial::program;
 
 /// The environment variable that names the command to the tests.
 const COMMAND: &str = "MUSLIP_COMMAND";
+
+/// The features of a wheel that is released.
+pub const FEATURES: &str = "extension-module";
 
 /// How much of the proof is part of the tests.
 const SMALL: Proof = Proof {
@@ -32,28 +36,26 @@ pub struct Proof {
 
 /// As [`test`], against a command that is built for it.
 pub fn test_alone() -> Result<()> {
-    test(&commanded()?)
+    let (muslip, features) = beside()?;
+    test(&muslip, features)
 }
 
-/// The command that the package is held against, built.
-pub fn commanded() -> Result<String> {
-    run(
-        "the command that the package is held against",
-        cargo(&[
-            "build",
-            "--package",
-            "muslip-cli",
-            "--profile",
-            CHECKED,
-            "--locked",
-        ]),
-    )?;
-    Ok(program(&target(), CHECKED, "muslip"))
+/// The command that the package is held against, and the features of a wheel that is built beside it: what both depend on is
+/// then built once.
+pub fn beside() -> Result<(String, &'static str)> {
+    let mut build = cargo(&["build", "--profile", CHECKED, "--locked", "--bin=muslip"]);
+    build
+        .args(["--package=muslip-cli", "--package=muslip-python"])
+        .args(["--features", "muslip-python/extension-module"])
+        .args(["--features", "muslip-python/beside-command"]);
+    run("the command that the package is held against", build)?;
+    let features = "extension-module,beside-command";
+    Ok((program(&target(), CHECKED, "muslip"), features))
 }
 
 /// Builds the wheel, installs it into virtual environments of its own and runs the package's tests there, against this
 /// command.
-pub fn test(muslip: &str) -> Result<()> {
+pub fn test(muslip: &str, features: &str) -> Result<()> {
     let python = environment("python", "requirements.txt")?;
     for (name, arguments) in [
         (
@@ -77,7 +79,7 @@ pub fn test(muslip: &str) -> Result<()> {
             .env("MYPY_CACHE_DIR", target().join("mypy"));
         run(name, check)?;
     }
-    let wheel = built(&python, CHECKED)?;
+    let wheel = built(&python, CHECKED, features)?;
     install(&python, &wheel)?;
     // As those see it who use it: the stub against the compiled module, and whether every public type is known.
     let mut stub = command(&python, &["-m", "mypy.stubtest", "--ignore-disjoint-bases"]);
@@ -98,12 +100,7 @@ pub fn test(muslip: &str) -> Result<()> {
         ],
     );
     // It looks for packages by the first python of the search path.
-    let path = std::env::var_os("PATH").unwrap_or_default();
-    let first = Path::new(&python).parent().map(Path::to_owned);
-    known.current_dir(wheels()).env(
-        "PATH",
-        std::env::join_paths(first.into_iter().chain(std::env::split_paths(&path)))?,
-    );
+    known.current_dir(wheels()).env("PATH", path_with(&python)?);
     run("Python: every public type is known", known)?;
     tested(&python, muslip, &[])?;
     let mut reference = command(
@@ -115,7 +112,7 @@ pub fn test(muslip: &str) -> Result<()> {
         .arg(target().join("python-reference"))
         .current_dir(wheels());
     run("Python: reference", reference)?;
-    prove(&wheel, SMALL)
+    prove(&wheel, SMALL, "fleet-of-the-tests")
 }
 
 /// Runs the tests of the installed package, against this command.
@@ -143,11 +140,11 @@ pub fn tested(python: &str, muslip: &str, arguments: &[&str]) -> Result<()> {
 /// `cargo xtask fleet`: the proof on a large fleet, by a wheel that is built as a release is.
 pub fn fleet(proof: Proof) -> Result<()> {
     let python = environment("python", "requirements.txt")?;
-    prove(&built(&python, "release")?, proof)
+    prove(&built(&python, "release", FEATURES)?, proof, "fleet")
 }
 
 /// A fleet through Spark, with all that goes wrong: `python/tests/proof.py`.
-fn prove(wheel: &Path, proof: Proof) -> Result<()> {
+fn prove(wheel: &Path, proof: Proof, folder_name: &str) -> Result<()> {
     setup::for_spark()?;
     let spark = environment("spark", "requirements-spark.txt")?;
     let executor = environment("executor", "requirements-executor.txt")?;
@@ -158,7 +155,7 @@ fn prove(wheel: &Path, proof: Proof) -> Result<()> {
         .args(["--executor", &executor, "--wheel"])
         .arg(wheel)
         .arg("--folder")
-        .arg(target().join("fleet"));
+        .arg(target().join(folder_name));
     for (name, count) in [
         ("--recordings", proof.recordings),
         ("--diagnoses", proof.diagnoses),
@@ -180,13 +177,21 @@ pub fn environment(name: &str, requirements: &str) -> Result<String> {
     Ok(python.to_string_lossy().into_owned())
 }
 
+/// The search path with what is beside an interpreter first, as an environment that is activated has it.
+pub fn path_with(python: &str) -> Result<OsString> {
+    let path = std::env::var_os("PATH").unwrap_or_default();
+    let first = Path::new(python).parent().map(Path::to_owned);
+    let folders = first.into_iter().chain(std::env::split_paths(&path));
+    Ok(std::env::join_paths(folders)?)
+}
+
 /// Where the wheel is built.
 fn wheels() -> PathBuf {
     target().join("wheels")
 }
 
 /// The wheel, built anew in a profile.
-pub fn built(python: &str, profile: &str) -> Result<PathBuf> {
+pub fn built(python: &str, profile: &str, features: &str) -> Result<PathBuf> {
     let wheels = wheels();
     if wheels.exists() {
         fs::remove_dir_all(&wheels)?;
@@ -201,6 +206,8 @@ pub fn built(python: &str, profile: &str) -> Result<PathBuf> {
             "--quiet",
             "--profile",
             profile,
+            "--features",
+            features,
         ],
     );
     build

@@ -75,7 +75,7 @@ pub fn run_all() -> Result<()> {
         .env(formats::PYTHON, formats::python()?);
     let tally = tests("tests of the workspace", workspace)?;
 
-    python::test(&trial::under_test())?;
+    python::test(&trial::under_test(), python::FEATURES)?;
 
     trial::small()?;
 

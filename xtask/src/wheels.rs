@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail};
 
-use crate::python::{commanded, environment, folder, install, tested, the_wheel};
+use crate::python::{beside, environment, folder, install, path_with, tested, the_wheel};
 use crate::setup;
 use crate::step::{command, root, run, target};
 
@@ -14,9 +14,6 @@ const LINUX: [(&str, &str); 2] = [
     ("x86_64-unknown-linux-gnu", "x86_64"),
     ("aarch64-unknown-linux-gnu", "aarch64"),
 ];
-
-/// What no Linux can run or look into: that they are built is all that is known of them here.
-const OTHERS: [&str; 2] = ["x86_64-pc-windows-gnu", "aarch64-apple-darwin"];
 
 /// Of the package's tests, what a wheel of a release has not: no panic can be put into it.
 const NOT_OF_A_RELEASE: &str = "not panic";
@@ -31,9 +28,9 @@ const IMPORTED: [&str; 5] = ["numpy", "pandas", "polars", "pyarrow", "pytest"];
 /// Builds the wheels with zig, looks at them from outside, and runs the package's tests by those that a Python can be had for.
 pub fn build() -> Result<()> {
     let tools = environment("wheels", "requirements-wheels.txt")?;
-    let muslip = commanded()?;
+    let (muslip, _) = beside()?;
     for (rust, machine) in LINUX {
-        let wheel = built(&tools, rust, &["--compatibility", "manylinux2014"])?;
+        let wheel = built(&tools, rust)?;
         let mut looked_at = command(&tools, &[]);
         looked_at
             .arg(folder().join("tests/wheels.py"))
@@ -51,18 +48,11 @@ pub fn build() -> Result<()> {
             emulated(&tools, &wheel, machine, &muslip)?;
         }
     }
-    for rust in OTHERS {
-        let wheel = built(&tools, rust, &[])?;
-        println!(
-            "{}: built, and not run: there is no such machine here",
-            wheel.display()
-        );
-    }
     Ok(())
 }
 
 /// The wheel for a target, built by maturin with zig's compiler and linker.
-fn built(tools: &str, rust: &str, more: &[&str]) -> Result<PathBuf> {
+fn built(tools: &str, rust: &str) -> Result<PathBuf> {
     setup::rust_target(rust)?;
     let wheels = target().join("wheels").join(rust);
     if wheels.exists() {
@@ -74,11 +64,13 @@ fn built(tools: &str, rust: &str, more: &[&str]) -> Result<PathBuf> {
     );
     build
         .args(["--profile", "release", "--target", rust])
-        .args(more)
+        .args(["--compatibility", "manylinux2014"])
         .arg("--manifest-path")
         .arg(folder().join("Cargo.toml"))
         .arg("--out")
-        .arg(&wheels);
+        .arg(&wheels)
+        // Where maturin finds zig.
+        .env("PATH", path_with(tools)?);
     run(&format!("the wheel for {rust}"), build)?;
     the_wheel(&wheels)
 }
