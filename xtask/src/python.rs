@@ -69,7 +69,16 @@ pub fn test(muslip: &str, features: &str) -> Result<()> {
         ("Python: types", &["-m", "mypy", "--no-error-summary"]),
         (
             "Python: types, a second opinion",
-            &["-m", "basedpyright", "--warnings", "--pythonpath", &python],
+            // Its settings are the package's, whatever lies in folders above.
+            &[
+                "-m",
+                "basedpyright",
+                "--warnings",
+                "--project",
+                "pyproject.toml",
+                "--pythonpath",
+                &python,
+            ],
         ),
     ] {
         let mut check = command(&python, arguments);
