@@ -12,6 +12,7 @@ use std::fmt::Write as _;
 
 use muslip_diagnose::mechanism::Law;
 use muslip_diagnose::repaired::{Repaired, RepairedTerm};
+use nalgebra::{SMatrix, SVector};
 
 use crate::fit::FitResult;
 
@@ -485,7 +486,6 @@ fn squares(coefficients: &Coefficients, grid: &[Point]) -> f64 {
     if sum.is_finite() { sum } else { f64::INFINITY }
 }
 
-#[allow(clippy::needless_range_loop, reason = "matrices by their indices")]
 /// Levenberg and Marquardt's method with derivatives by differences; the first so many of the six are free.
 fn fitted(start: Coefficients, grid: &[Point], unknowns: usize) -> (Coefficients, f64) {
     let mut best = start;
@@ -493,8 +493,8 @@ fn fitted(start: Coefficients, grid: &[Point], unknowns: usize) -> (Coefficients
     let mut damping = 1e-3;
     for _ in 0..MOST_STEPS {
         let at = best.as_array();
-        let mut normal = [[0.0; 6]; 6];
-        let mut right = [0.0; 6];
+        let mut normal = SMatrix::<f64, 6, 6>::zeros();
+        let mut right = SVector::<f64, 6>::zeros();
         let columns: Vec<(f64, Coefficients)> = (0..unknowns)
             .map(|k| {
                 let mut moved = at;
@@ -507,29 +507,28 @@ fn fitted(start: Coefficients, grid: &[Point], unknowns: usize) -> (Coefficients
         for point in grid {
             let here = best.friction(point.slip, point.load);
             let off = point.friction - here;
-            let mut row = [0.0; 6];
+            let mut row = SVector::<f64, 6>::zeros();
             for (cell, (step, moved)) in row.iter_mut().zip(&columns) {
                 *cell = (moved.friction(point.slip, point.load) - here) / step;
             }
-            for i in 0..unknowns {
-                right[i] += row[i] * off;
-                for j in 0..unknowns {
-                    normal[i][j] += row[i] * row[j];
-                }
-            }
+            right += row * off;
+            normal += row * row.transpose();
         }
         let before = cost;
         // Longer and longer strides towards the gradient until one gains.
         while damping < 1e12 {
             let mut damped = normal;
-            for (k, row) in damped.iter_mut().enumerate().take(unknowns) {
-                row[k] *= 1.0 + damping;
+            for k in 0..6 {
+                // What is not free stays where it is.
+                damped[(k, k)] = if k < unknowns {
+                    damped[(k, k)] * (1.0 + damping)
+                } else {
+                    1.0
+                };
             }
-            let next = solved(damped, right, unknowns).map(|step| {
-                let mut values = at;
-                values.iter_mut().zip(step).for_each(|(x, dx)| *x += dx);
-                best.with(values)
-            });
+            let step = damped.lu().solve(&right);
+            let step = step.filter(|step| step.iter().all(|dx| dx.is_finite()));
+            let next = step.map(|step| best.with((SVector::from(at) + step).into()));
             let then = next.map_or(f64::INFINITY, |next| squares(&next, grid));
             if let (Some(next), true) = (next, then < cost) {
                 (best, cost) = (next, then);
@@ -543,28 +542,6 @@ fn fitted(start: Coefficients, grid: &[Point], unknowns: usize) -> (Coefficients
         }
     }
     (best, cost)
-}
-
-#[allow(clippy::needless_range_loop, reason = "matrices by their indices")]
-/// Gauss' elimination with pivots; `None` where the matrix is singular.
-fn solved(mut a: [[f64; 6]; 6], mut b: [f64; 6], n: usize) -> Option<[f64; 6]> {
-    for k in 0..n {
-        let pivot = (k..n).max_by(|&i, &j| a[i][k].abs().total_cmp(&a[j][k].abs()))?;
-        a.swap(k, pivot);
-        b.swap(k, pivot);
-        for i in k + 1..n {
-            let factor = a[i][k] / a[k][k];
-            for j in k..n {
-                a[i][j] -= factor * a[k][j];
-            }
-            b[i] -= factor * b[k];
-        }
-    }
-    for k in (0..n).rev() {
-        let known: f64 = (k + 1..n).map(|j| a[k][j] * b[j]).sum();
-        b[k] = (b[k] - known) / a[k][k];
-    }
-    b.iter().all(|x| x.is_finite()).then_some(b)
 }
 
 #[cfg(test)]
