@@ -71,7 +71,7 @@ def test_what_goes_wrong_is_a_row_with_the_commands_line(made, tmp_path):
         bad.write_bytes(noise)
         assert process(bad, rig)["error"]
     row = process(fleets.endless(tmp_path), rig, timeout_s=0.5)
-    assert row["error"] == "error: took longer than 0.5 s" and row["seconds"] < 60
+    assert row["error"] == "error: took longer than 0.5 s" and row["seconds"] < 5
 
 
 def test_a_pool_leaves_a_row_each_and_goes_on(made, tmp_path):
