@@ -86,7 +86,8 @@ pub fn noise_sigma(values: &[f64], step_s: f64) -> f64 {
             .collect();
         difference_sigma(&means) * (samples as f64).sqrt()
     };
-    (2..)
+    // Fewer than four means have no third difference.
+    (2..=values.len() / 4)
         .take_while(|samples| *samples as f64 * step_s <= LONGEST_MEAN_S)
         .map(of_means)
         .fold(fine, f64::max)
