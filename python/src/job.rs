@@ -15,6 +15,9 @@ use crate::failure::Failure;
 /// How often signals are looked for and progress is told.
 const BEAT: Duration = Duration::from_millis(50);
 
+/// Work on fewer bytes is over before anybody could interrupt it, and a thread would cost a good part of it.
+const SHORT_BYTES: u64 = 1 << 18;
+
 /// What unwinds through work that nobody waits for any more.
 struct Cancelled;
 
@@ -25,6 +28,13 @@ pub(crate) struct Reporter {
 }
 
 impl Reporter {
+    fn new() -> Self {
+        Self {
+            cancelled: AtomicBool::new(false),
+            told: Mutex::new((0.0, String::new())),
+        }
+    }
+
     /// Tells the share done of which step. Does not come back where the work was cancelled: it unwinds to the border, without the words of a panic.
     pub(crate) fn tell(&self, share: f64, step: &str) {
         if self.cancelled.load(Ordering::Relaxed) {
@@ -53,10 +63,7 @@ pub(crate) fn run<T: Send + 'static>(
     progress: Option<&Py<PyAny>>,
     work: impl FnOnce(&Reporter) -> Result<T, Failure> + Send + 'static,
 ) -> PyResult<T> {
-    let reporter = Arc::new(Reporter {
-        cancelled: AtomicBool::new(false),
-        told: Mutex::new((0.0, String::new())),
-    });
+    let reporter = Arc::new(Reporter::new());
     let (done, outcome) = channel();
     let at_work = Arc::clone(&reporter);
     let thread = thread::Builder::new().name("muslip".to_owned());
@@ -101,6 +108,21 @@ pub(crate) fn run<T: Send + 'static>(
             }
         }
     }
+}
+
+/// As [`run`], of a recording of so many bytes: of few, and where nobody is told of progress, on the thread that asks.
+pub(crate) fn run_on<T: Send + 'static>(
+    py: Python<'_>,
+    progress: Option<&Py<PyAny>>,
+    length_bytes: u64,
+    work: impl FnOnce(&Reporter) -> Result<T, Failure> + Send + 'static,
+) -> PyResult<T> {
+    if progress.is_some() || length_bytes >= SHORT_BYTES {
+        return run(py, progress, work);
+    }
+    let result = py.detach(|| guarded(|| work(&Reporter::new())))?;
+    py.check_signals()?;
+    Ok(result)
 }
 
 /// Runs what must not panic into Python.

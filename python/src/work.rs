@@ -160,7 +160,8 @@ pub(crate) fn estimate(
         None => None,
     };
     let (file, rig_map, rig) = (rig.file.clone(), rig.map.clone(), shown(rig.path_or_name()));
-    job::run(py, progress.as_ref(), move |reporter| {
+    let length_bytes = source.length_bytes();
+    job::run_on(py, progress.as_ref(), length_bytes, move |reporter| {
         let map = map_of(map.as_ref())?.or(rig_map);
         let mut recording = source.open(map.as_ref())?;
         let all = 2 * recording.length_bytes().max(1);

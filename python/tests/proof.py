@@ -110,7 +110,7 @@ class Submission:
         while self.driver.poll() is None:
             for name, words in PROCESSES.items():
                 self.peak_mb[name] = max([self.peak_mb.get(name, 0.0), *map(peak_mb, self.processes(words))])
-            time.sleep(0.2)
+            time.sleep(1.0)
         printed, _ = self.driver.communicate()
         assert self.driver.returncode == 0, f"status {self.driver.returncode}, {printed}\n{self.log.read_text()[-4000:]}"
         self.took_s = [float(seconds) for seconds in re.findall(r"^took ([\d.]+) s$", printed, re.M)]
@@ -158,6 +158,12 @@ def made(folder: pathlib.Path, count: int, **of: float) -> list[str]:
     with concurrent.futures.ProcessPoolExecutor(CORES, multiprocessing.get_context("spawn")) as pool:
         of_each = [pool.submit(fleets.small, folder, some, 1 + index * share, **of) for index, some in enumerate(counts)]
         return [path for one in of_each for path in one.result()]
+
+
+def read(paths: list[str]) -> None:
+    """Read files once, so that neither of two that are compared waits for the disk."""
+    for path in paths:
+        pathlib.Path(path).read_bytes()
 
 
 def loop(rig: pathlib.Path, paths: list[str]) -> float:
@@ -291,7 +297,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--recordings", type=int, default=100_000)
     parser.add_argument("--diagnoses", type=int, default=1_000)
-    parser.add_argument("--large", type=int, default=200)
+    parser.add_argument("--large", type=int, default=400)
     parser.add_argument("--executor", required=True, help="a python with pandas and pyarrow")
     parser.add_argument("--wheel", required=True)
     parser.add_argument("--folder", type=pathlib.Path, required=True)
@@ -315,6 +321,7 @@ def main() -> None:
     size = sum(os.path.getsize(path) for path in paths) / len(paths)
     relative = [os.path.relpath(path, folder) for path in paths]
 
+    read(paths)
     with timed("spark-submit, all of it") as whole:
         submission = cluster.readme()
         (counts,) = submission.counts()
@@ -324,7 +331,7 @@ def main() -> None:
     ratios = []
     if given.recordings >= FEWEST_TO_MEASURE:
         written = sorted(path.stat().st_mtime for path in (folder / "results").glob("part-*"))
-        rate = loop(rig, paths[: given.recordings // 20])
+        rate = loop(rig, [str(folder / path) for path in ours])
         # What the first part waited for is Spark's start.
         spark = len(ours) * (len(written) - 1) / len(written) / (written[-1] - written[0]) / CORES
         started = len(ours) / whole[0] / CORES
@@ -339,12 +346,13 @@ def main() -> None:
         with timed(f"{given.large} large recordings made"):
             large = made(folder / "large", given.large, rate_hz=1000.0, duration_s=60.0)
         size = sum(os.path.getsize(path) for path in large) / len(large)
+        read(large)
         with timed("spark-submit, all of it"):
             (counts,) = cluster.submit(*cluster.words("large/*", "results-large")).counts()
         check("large", folder / "results-large", [os.path.relpath(path, folder) for path in large], 0, counts)
         written = sorted(path.stat().st_mtime for path in (folder / "results-large").glob("part-*"))
         seconds = pandas.read_parquet(folder / "results-large")["seconds"]
-        rate = loop(rig, large[: max(2 * CORES, given.large // 5)])
+        rate = loop(rig, large)
         spark = given.large / (written[-1] - written[0] + seconds.mean()) / CORES
         ratios.append(spark / rate)
         rates = f"loop {rate:.2f}, Spark {spark:.2f}, ratio {spark / rate:.2f}"

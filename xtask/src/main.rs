@@ -124,7 +124,7 @@ enum Command {
         #[arg(long, default_value_t = 1_000)]
         diagnoses: u32,
         /// Recordings of a minute at 1 kHz.
-        #[arg(long, default_value_t = 200)]
+        #[arg(long, default_value_t = 400)]
         large: u32,
     },
     /// Write the field guide, docs/mechanisms.md with its pictures, from what the mechanisms say of themselves.

@@ -362,7 +362,9 @@ impl Source {
         }
     }
 
-    fn length_bytes(&self) -> u64 {
+    /// Bytes of its file, or of its values in memory; 0 where there is no such file.
+    #[must_use]
+    pub fn length_bytes(&self) -> u64 {
         match self {
             Self::File(path) => fs::metadata(path).map_or(0, |metadata| metadata.len()),
             Self::Memory(memory) => Recording::of_memory(memory.clone()).length_bytes(),

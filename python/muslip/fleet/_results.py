@@ -39,7 +39,7 @@ GROUPS = pyarrow.schema([
 ABOUT = "_fleet.json"
 """What the data set is, beside its parts."""
 
-_RECORDINGS_A_PART = 64
+_RECORDINGS_A_PART = 256
 _FEWEST_PARTS = 256
 
 

@@ -29,8 +29,7 @@ def _answered(packed: bytes, asked: pandas.DataFrame) -> pandas.DataFrame:
     from muslip.fleet._engines import here
 
     plan = pickle.loads(packed)
-    done = [here(pickle.loads(part), plan) for part in asked["units"]]
-    return asked[["part"]].assign(units=done)
+    return asked[["part"]].assign(units=here([pickle.loads(part) for part in asked["units"]], plan))
 
 
 def batches_by(packed: bytes) -> Callable[[Iterator[pandas.DataFrame]], Iterator[pandas.DataFrame]]:

@@ -1,10 +1,10 @@
-"""The work of one part of the results, whatever engine asks for it."""
+"""The work of parts of the results, whatever engine asks for it."""
 
 from __future__ import annotations
 
 import contextlib
 import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 import muslip
@@ -115,35 +115,38 @@ def _guarded(child: _child.Child, works: list[Work], needed: tuple[Rigs, Maps, O
         yield failed | {"seconds": time.perf_counter() - start}
 
 
-def work_on(part: Part, plan: Plan, child: _child.Child) -> int:
-    """Bring one part of the results up to date; answers with the number of its recordings or groups.
+def work_on(parts: Sequence[Part], plan: Plan, child: _child.Child) -> list[int]:
+    """Bring parts of the results up to date; answers with the number of recordings or groups of each.
 
     What is there of the same recording, version and settings stays; the rest is worked out and written, part by part, whole.
+    The child is given all of it at once, and computes while parts are written.
     """
     if plan.asked.version != muslip.__version__:
         raise RuntimeError(f"muslip {muslip.__version__} here, {plan.asked.version} where the run was started")
-    name, units = part
-    rows = plan.results.rows(name)
-    written, is_changed = time.monotonic(), False
+    there = [plan.results.rows(name) for name, _ in parts]
     works = []
-    for unit in units:
-        before = rows.get(unit.key)
-        made = (plan.asked.version, plan.asked.settings_of(unit))
-        is_known = before is not None and plan.resume and (before["version"], before["settings"]) == made
-        works.append(plan.asked.work_of(unit, before["fingerprint"] if before is not None and is_known else None))
-    for unit, result in zip(units, _guarded(child, works, plan.asked.needed_by(units)), strict=True):
-        before = rows.get(unit.key)
-        if result is not None:
-            row = plan.asked.made(unit, result)
-        else:
-            assert before is not None
-            row = {**before, **unit.labels()}
-        row = full(row, plan.results.schema)
-        is_changed |= row != before
-        rows[unit.key] = row
-        if is_changed and time.monotonic() - written > FLUSH_S:
+    for (_, units), rows in zip(parts, there, strict=True):
+        for unit in units:
+            before = rows.get(unit.key)
+            made = (plan.asked.version, plan.asked.settings_of(unit))
+            is_known = before is not None and plan.resume and (before["version"], before["settings"]) == made
+            works.append(plan.asked.work_of(unit, before["fingerprint"] if before is not None and is_known else None))
+    results = _guarded(child, works, plan.asked.needed_by(unit for _, units in parts for unit in units))
+    for (name, units), rows in zip(parts, there, strict=True):
+        written, is_changed = time.monotonic(), False
+        for unit in units:
+            before, result = rows.get(unit.key), next(results)
+            if result is not None:
+                row = plan.asked.made(unit, result)
+            else:
+                assert before is not None
+                row = {**before, **unit.labels()}
+            row = full(row, plan.results.schema)
+            is_changed |= row != before
+            rows[unit.key] = row
+            if is_changed and time.monotonic() - written > FLUSH_S:
+                plan.results.write(name, rows.values())
+                written, is_changed = time.monotonic(), False
+        if is_changed:
             plan.results.write(name, rows.values())
-            written, is_changed = time.monotonic(), False
-    if is_changed:
-        plan.results.write(name, rows.values())
-    return len(units)
+    return [len(units) for _, units in parts]

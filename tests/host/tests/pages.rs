@@ -4,7 +4,8 @@
 
 use crate::browser::{Browser, NARROW, View, WIDE};
 use crate::common::{RIG, Scratch, recording_of};
-use serde_json::Value;
+use serde_json::{Value, json};
+use std::time::{Duration, Instant};
 use test_support::scenario::article;
 
 /// A folder with a rig file and the article's stream as a recording.
@@ -157,6 +158,65 @@ fn the_campaign_s_page_sorts_marks_and_links() {
             .read(&format!("all/{target}"))
             .contains("player-curve")
     );
+}
+
+/// What a summary of so many recordings says, made up: of the size and the spread of a test department's.
+fn fleet_of(recordings: u32) -> muslip_report::fleet::Fleet {
+    use rand_distr::Distribution;
+    let mut noise =
+        <rand_chacha::ChaCha8Rng as rand_chacha::rand_core::SeedableRng>::seed_from_u64(1);
+    let mut drawn = |mean: f64, scatter: f64| -> Vec<f64> {
+        let normal = rand_distr::Normal::new(mean, scatter).unwrap();
+        (0..recordings).map(|_| normal.sample(&mut noise)).collect()
+    };
+    let points = json!({"peak_friction": drawn(0.85, 0.03), "critical_slip": drawn(0.14, 0.01)});
+    let at = |value: f64| json!({"value": value, "std": 0.001});
+    let levels = (0..40).map(|rig| {
+        json!({"name": format!("rig-{rig}"), "recordings": 2_500, "mean": at(0.83 + 0.001 * f64::from(rig)), "scatter": 0.02})
+    });
+    let levels: Vec<Value> = levels.collect();
+    let days =
+        (0..60).map(|day| json!([format!("day {day}"), 0.85 + 0.0005 * f64::from(day), 0.003]));
+    let days: Vec<Value> = days.collect();
+    let outliers = (0..500).map(|run| {
+        json!({"path": format!("runs/{run:06}.mf4"), "quantity": "peak_friction", "value": at(1.2), "median": 0.85, "sigmas": 11.0})
+    });
+    let outliers: Vec<Value> = outliers.collect();
+    let fleet = json!({
+        "recordings": recordings + 7, "estimated": recordings, "errors": {"cannot be read": 7},
+        "peak_friction": at(0.85), "critical_slip": at(0.14),
+        "factors": [{"name": "rig", "quantity": "peak_friction", "levels": levels, "mean": at(0.85), "between": 0.01, "crossed": 0.008}],
+        "drifts": [{"rig": "rig-7", "per_day": {"value": 0.0005, "std": 1e-5}, "p": 1e-9, "days": 60, "drifts": true, "course": days}],
+        "outliers": outliers,
+        "mechanisms": [{"mechanism": "force_delay", "named": 250, "diagnoses": 1000, "low": 0.22, "high": 0.28, "confidence": 0.9}],
+        "points": points,
+    });
+    serde_json::from_value(fleet).unwrap()
+}
+
+#[test]
+fn a_fleet_s_page_has_no_more_elements_for_a_hundred_thousand_recordings() {
+    let Some(mut browser) = Browser::start() else {
+        return;
+    };
+    let scratch = Scratch::new();
+    let mut elements = Vec::new();
+    for (recordings, page) in [(1_000, "few.html"), (100_000, "many.html")] {
+        let fleet = fleet_of(recordings).page("results", "python -m muslip.fleet summary results");
+        scratch.write(page, fleet.to_html().unwrap());
+        for view in [WIDE, NARROW] {
+            let start = Instant::now();
+            check(&mut browser, &scratch, page, view);
+            let took = start.elapsed();
+            println!("{page} at {}: looked at in {took:.1?}", view.width);
+            // Ten times what it takes on a quiet machine; a page that lags takes minutes.
+            assert!(took < Duration::from_secs(60), "{page} took {took:.1?}");
+        }
+        elements.push(browser.number("document.querySelectorAll('*').length"));
+        let drawn = browser.number("document.querySelectorAll('canvas').length");
+        assert!(drawn >= 4.0, "{drawn} figures");
+    }
+    assert_eq!(elements[0], elements[1]);
 }
 
 #[test]
