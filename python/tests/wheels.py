@@ -54,8 +54,9 @@ def main() -> None:
     assert elf["e_machine"] == MACHINES[given.machine], elf["e_machine"]
     libraries, versions = needed(elf)
     policies = WheelPolicies(libc=Libc.GLIBC, arch=Architecture(given.machine))
-    allowed = next(policy for policy in policies.policies if "manylinux2014" in "".join((policy.name, *policy.aliases)))
-    foreign = sorted(set(libraries) - set(allowed.whitelist))
+    allowed = policies.get_policy_by_name(f"manylinux_{GLIBC[0]}_{GLIBC[1]}_{given.machine}")
+    # The loader is every machine's own.
+    foreign = [name for name in libraries if name not in allowed.whitelist and not name.startswith("ld-linux")]
     assert not foreign, f"needs {foreign}, which a machine of manylinux2014 may not have"
     glibc = [
         tuple(map(int, found.group(1).split(".")))

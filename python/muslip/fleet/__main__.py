@@ -13,7 +13,7 @@ from muslip.fleet import diagnose, run, summary, to_delta
 def _table(path: str) -> Any:
     import pandas
 
-    return pandas.read_parquet(path) if path.endswith(".parquet") else pandas.read_csv(path, dtype=str)
+    return pandas.read_parquet(path, use_threads=False) if path.endswith(".parquet") else pandas.read_csv(path, dtype=str)
 
 
 def _arguments() -> argparse.ArgumentParser:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import io
 import json
 from collections.abc import Iterable
 from typing import NamedTuple, cast
@@ -53,6 +52,11 @@ def full(row: Row, schema: pyarrow.Schema) -> Row:
     return {name: row.get(name) for name in schema.names}
 
 
+def _read(content: bytes, columns: list[str] | None = None) -> pyarrow.Table:
+    """The rows of a part, on this thread alone: one of Arrow's own that is still at it when Python ends aborts the process."""
+    return pyarrow.parquet.ParquetFile(pyarrow.BufferReader(content), pre_buffer=False).read(columns, use_threads=False)
+
+
 class Results:
     """A data set, as the runs before left it.
 
@@ -93,15 +97,15 @@ class Results:
         if content is None:
             return {}
         kind = key_of(self.schema)
-        rows = pyarrow.parquet.read_table(io.BytesIO(content)).to_pylist()
+        rows = _read(content).to_pylist()
         return {row[kind]: row for row in rows}
 
     def write(self, part: str, rows: Iterable[Row]) -> None:
         """Write a part anew, whole, its rows in the order of their keys."""
         ordered = sorted(rows, key=lambda row: str(row[key_of(self.schema)]))
-        content = io.BytesIO()
+        content = pyarrow.BufferOutputStream()
         pyarrow.parquet.write_table(pyarrow.Table.from_pylist(ordered, self.schema), content)
-        self.folder.write(part, content.getvalue())
+        self.folder.write(part, content.getvalue().to_pybytes())
 
     def table(self, columns: list[str] | None = None) -> pyarrow.Table:
         """All rows."""
@@ -110,7 +114,7 @@ class Results:
         for part in parts:
             content = self.folder.read(part)
             if content is not None:
-                tables.append(pyarrow.parquet.read_table(io.BytesIO(content), columns=columns))
+                tables.append(_read(content, columns))
         if not tables:
             return self.schema.empty_table().select(columns or self.schema.names)
         return pyarrow.concat_tables(tables)
