@@ -94,6 +94,11 @@ class Child:
         """Of its process, while there is one."""
         return None if self._process is None else self._process.pid
 
+    def ready(self) -> None:
+        """Start its process where there is none."""
+        if self._process is None:
+            self._start()
+
     def call(self, function: Callable[..., Any], *arguments: object, timeout_s: float | None = None) -> Any:
         """What a function answers there; its process is started where there is none.
 

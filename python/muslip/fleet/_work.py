@@ -90,6 +90,8 @@ def _guarded(child: _child.Child, works: list[Work], needed: tuple[Rigs, Maps, O
     left = list(works)
     is_alone, deaths = False, 0
     while left:
+        # A row is charged with its work, and not with the start of a process.
+        child.ready()
         start = time.perf_counter()
         given = left[:1] if is_alone else list(left)
         try:
@@ -100,7 +102,7 @@ def _guarded(child: _child.Child, works: list[Work], needed: tuple[Rigs, Maps, O
                 start = time.perf_counter()
             continue
         except _child.TooLong:
-            failed: Row = {"error": f"error: took longer than {timeout_s:g} s"}
+            failed: Row = {"error": f"error: took longer than {timeout_s:g} s", "seconds": time.perf_counter() - start}
             with contextlib.suppress(_child.TooLong, _child.Died):
                 # It would again: a result, with the time that it may take among its settings.
                 failed["fingerprint"] = child.call(fingerprint_of, left[0][0], timeout_s=timeout_s)
@@ -109,10 +111,10 @@ def _guarded(child: _child.Child, works: list[Work], needed: tuple[Rigs, Maps, O
             is_alone, deaths = True, deaths + 1
             if deaths < 2:
                 continue
-            failed = {"error": f"error: its process died twice: {error}"}
+            failed = {"error": f"error: its process died twice: {error}", "seconds": time.perf_counter() - start}
         del left[0]
         deaths = 0
-        yield failed | {"seconds": time.perf_counter() - start}
+        yield failed
 
 
 def work_on(parts: Sequence[Part], plan: Plan, child: _child.Child) -> list[int]:
