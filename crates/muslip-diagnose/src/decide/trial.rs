@@ -288,13 +288,15 @@ fn squares_by_best_law(data: &Data, judged: &Judged) -> Vec<f64> {
 }
 
 /// Shortest memory in s that is named: a filtered reading of the brake holds less noise than the reading itself, which
-/// looks like a short lag, so there its descriptor's smallest useful effect holds.
+/// looks like a short lag, so there its descriptor's smallest useful effect holds. None is shorter than the recording's
+/// step: how a reading changes between two samples is not known.
 fn least_memory_s(data: &Data, id: Id, entry: usize) -> f64 {
-    if id.balance() == Balance::Wheel {
+    let least_s = if id.balance() == Balance::Wheel {
         (data.catalogue.get(entry).guide().smallest_size)(&data.context)
     } else {
         LEAST_MEMORY_S
-    }
+    };
+    least_s.max(data.context.dt / data.averaged as f64)
 }
 
 /// Gain of the least effect that is worth a name, nats.

@@ -171,15 +171,21 @@ impl<'a> Chain<'a> {
         self.columns([Some(&curve), None, None])
     }
 
-    /// What smoothing over this reach takes off a force or torque, integrated.
-    fn smoothed_away(&self, x: &[f64], reach: f64) -> Vec<f64> {
+    /// A force or torque smoothed over this reach, within the stretches where its balance is formed.
+    fn smoothed(&self, x: &[f64], reach: f64) -> Vec<f64> {
         let s = self.series;
         let segments = if s.wheel_balance.is_empty() {
             &s.vehicle_balance
         } else {
             &s.wheel_balance
         };
-        let mean = mean_twice_about(&s.time, x, segments, reach);
+        mean_twice_about(&s.time, x, segments, reach)
+    }
+
+    /// What smoothing over this reach takes off a force or torque, integrated.
+    fn smoothed_away(&self, x: &[f64], reach: f64) -> Vec<f64> {
+        let s = self.series;
+        let mean = self.smoothed(x, reach);
         let mut sum = 0.0;
         (0..s.len())
             .map(|k| {
@@ -208,6 +214,22 @@ impl<'a> Chain<'a> {
         let level = self.smoothed_away(&force, reach);
         let lever = -self.data.context.radius;
         self.columns([None, Some(&|k| lever * level[k]), Some(&|k| level[k])])
+    }
+
+    /// A wheel speed behind poles is late, wide and lopsided. Its delay is taken off, its width has columns of its own; what
+    /// lopsidedness leaves of a balance goes by the second derivative of all that acts on the wheel, drag and brake
+    /// alike. A lag of the brake leaves that of the brake alone, and is told from it by this column.
+    fn by_poles_of_wheel(&self, reach: f64) -> Triple {
+        let Some(torque) = &self.series.torque else {
+            return Triple::default();
+        };
+        let radius = self.data.context.radius;
+        let force = quiet_force(self.series, &self.slopes.force[self.run]);
+        let acting: Vec<f64> = core::iter::zip(&torque.smooth, &force)
+            .map(|(torque, force)| torque - radius * force)
+            .collect();
+        let mean = self.smoothed(&acting, reach);
+        self.columns([None, Some(&|k| reach * (acting[k] - mean[k])), None])
     }
 
     /// A vehicle speed late by so many poles instead of by a delay.
@@ -270,12 +292,49 @@ pub fn nuisances(data: &Data, slopes: &Slopes, run: usize) -> Vec<(f64, Triple)>
         (1.0, chain.by_poles(2)),
         // Wheel speed low-passed.
         (3e-4, chain.by_wheel(|k| -0.5 * wheel_second[k])),
+        // Wheel speed behind poles, 20 ms.
+        (3.0, chain.by_poles_of_wheel(0.02)),
     ]
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::innovations::hypothesis::{Beside, judge_added};
+    use crate::innovations::toy::{EFFORT, Lags, Noise, settled, stop_with};
+    use crate::mechanism::Id;
+    use crate::model::Term;
+
+    /// What a lag of the brake gains in nats, no price taken off, and its time constant in s.
+    fn brake_lag_in(lags: Lags) -> (f64, f64) {
+        let data = stop_with(Noise::TYPICAL, lags, 7);
+        let base = settled(&data);
+        let entries = data.catalogue.entries();
+        let entry = entries.iter().position(|m| m.id() == Id::BrakeLag).unwrap();
+        let mut model = base.model.clone();
+        model.terms.push(Term {
+            entry,
+            parameters: vec![0.01],
+        });
+        let beside = Beside::new(&data, &base);
+        let with = judge_added(&data, &model, &[], &beside, EFFORT).unwrap();
+        (base.loss - with.loss, with.model.terms[0].parameters[0])
+    }
+
+    #[test]
+    fn poles_of_the_wheel_s_sensor_are_no_lag_of_the_brake_and_a_lag_is() {
+        let (gain, time_s) = brake_lag_in(Lags {
+            wheel_sensor_s: 0.012,
+            brake_s: 0.0,
+        });
+        assert!(gain < 8.0, "{gain} nats, {time_s} s");
+        let (gain, time_s) = brake_lag_in(Lags {
+            wheel_sensor_s: 0.0,
+            brake_s: 0.02,
+        });
+        assert!(gain > 30.0, "{gain} nats, {time_s} s");
+        assert!((time_s - 0.02).abs() < 0.004, "{time_s} s");
+    }
 
     #[test]
     fn a_step_through_a_pole_ahead_of_its_delay_leaves_what_has_not_passed_yet() {

@@ -5,8 +5,10 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution as _, StandardNormal};
 
 use super::blocks::blocks;
+use super::hypothesis::{Effort, Guess, Judged, judge};
 use crate::campaign::{Rig, Run};
 use crate::data::Data;
+use crate::model::Model;
 
 pub(super) const PEAK: f64 = 0.8;
 pub(super) const CRITICAL: f64 = 0.12;
@@ -35,8 +37,22 @@ impl Noise {
     };
 }
 
+/// What stands between a stop and its recording, each a time constant in s.
+#[derive(Clone, Copy, Default)]
+pub(super) struct Lags {
+    /// Of two poles of the wheel speed's sensor, the delay of both taken off.
+    pub(super) wheel_sensor_s: f64,
+    /// Of the brake behind its reading.
+    pub(super) brake_s: f64,
+}
+
 /// A quarter car whose brake comes and goes four times while it coasts, free rolling in between.
 pub(super) fn stop(noise: Noise, seed: u64) -> Data {
+    stop_with(noise, Lags::default(), seed)
+}
+
+/// The same with lags.
+pub(super) fn stop_with(noise: Noise, lags: Lags, seed: u64) -> Data {
     let rig = Rig {
         radius_m: 0.3,
         wheel_inertia_kg_m2: 1.2,
@@ -57,6 +73,17 @@ pub(super) fn stop(noise: Noise, seed: u64) -> Data {
         ..Run::default()
     };
     let mut torques = Vec::new();
+    let step = STEP_S / INNER as f64;
+    let follow = |time_s: f64| {
+        if time_s > 0.0 {
+            1.0 - (-step / time_s).exp()
+        } else {
+            1.0
+        }
+    };
+    let mut braking = 0.0;
+    let mut poles = [omega; 2];
+    let mut sensed = Vec::new();
     for k in 0..STEPS {
         let time = STEP_S * k as f64;
         let torque =
@@ -66,20 +93,48 @@ pub(super) fn stop(noise: Noise, seed: u64) -> Data {
             LOAD_N * PEAK * 2.0 * x / (1.0 + x * x)
         };
         run.time_s.push(time);
-        run.wheel_speed_rad_s.push(omega + white(noise.wheel));
+        run.wheel_speed_rad_s.push(white(noise.wheel));
         run.vehicle_speed_m_s.push(v + white(1e-4));
         run.drag_force_n.push(force(v, omega) + white(noise.drag));
         run.normal_force_n.push(LOAD_N + white(noise.load));
         torques.push(torque + white(noise.torque));
         for _ in 0..INNER {
+            sensed.push(poles[1]);
             let f = force(v, omega);
-            let step = STEP_S / INNER as f64;
-            omega += step * (rig.radius_m * f - torque) / rig.wheel_inertia_kg_m2;
+            braking += follow(lags.brake_s) * (torque - braking);
+            omega += step * (rig.radius_m * f - braking) / rig.wheel_inertia_kg_m2;
             v -= step * f / rig.mass_kg;
+            let mut input = omega;
+            for pole in &mut poles {
+                *pole += follow(lags.wheel_sensor_s) * (input - *pole);
+                input = *pole;
+            }
         }
+    }
+    let late = (2.0 * lags.wheel_sensor_s / step).round() as usize;
+    for (k, wheel) in run.wheel_speed_rad_s.iter_mut().enumerate() {
+        *wheel += sensed[(INNER * k + late).min(sensed.len() - 1)];
     }
     run.brake_torque_nm = Some(torques);
     let mut data = Data::new(&rig, core::slice::from_ref(&run));
     data.blocks = blocks(&data.series);
     data
+}
+
+/// How hard a toy is tried.
+pub(super) const EFFORT: Effort = Effort {
+    steps: 8,
+    noise_steps: 20,
+    noise_stride: 1,
+};
+
+/// The law alone with its noise.
+pub(super) fn settled(data: &Data) -> Judged {
+    let law = Model::of_law(PEAK, CRITICAL);
+    let mut base = judge(data, &law, &[], Guess::None, EFFORT).unwrap();
+    for _ in 0..3 {
+        let guess = Guess::Sizes(&base.parts);
+        base = judge(data, &base.model, &[], guess, EFFORT).unwrap();
+    }
+    base
 }

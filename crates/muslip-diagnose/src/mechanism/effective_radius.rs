@@ -37,7 +37,6 @@ impl Describe for EffectiveRadius {
         };
         Facts {
             form,
-            through_force: false,
             ..Facts::of(Id::EffectiveRadius, Stage::Kinematics, equation)
         }
     }

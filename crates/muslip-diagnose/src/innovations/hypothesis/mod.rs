@@ -109,24 +109,14 @@ pub fn judge_added(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::innovations::toy::{CRITICAL, Noise, PEAK, stop};
+    use crate::innovations::toy::{EFFORT, Noise, settled, stop};
     use crate::mechanism::Id;
     use crate::model::Term;
 
     #[test]
     fn a_likelihood_never_falls_by_a_term_that_may_be_nothing() {
         let data = stop(Noise::TYPICAL, 4);
-        let effort = Effort {
-            steps: 8,
-            noise_steps: 20,
-            noise_stride: 1,
-        };
-        let law = Model::of_law(PEAK, CRITICAL);
-        let mut base = judge(&data, &law, &[], Guess::None, effort).unwrap();
-        for _ in 0..3 {
-            let guess = Guess::Sizes(&base.parts);
-            base = judge(&data, &base.model, &[], guess, effort).unwrap();
-        }
+        let base = settled(&data);
         let beside = Beside::new(&data, &base);
         let mut tried = 0;
         for (entry, mechanism) in data.catalogue.entries().iter().enumerate() {
@@ -141,7 +131,7 @@ mod tests {
                 entry,
                 parameters: nothing,
             });
-            let Some(with) = judge_added(&data, &model, &[], &beside, effort) else {
+            let Some(with) = judge_added(&data, &model, &[], &beside, EFFORT) else {
                 continue;
             };
             tried += 1;
