@@ -83,11 +83,6 @@ impl Sequence {
         self.fault
     }
 
-    /// The profile being run.
-    pub fn profile(&self) -> Option<&Profile> {
-        self.profile.as_ref()
-    }
-
     /// True once a state has lasted too long; cleared by [`Sequence::clear`].
     pub fn timed_out(&self) -> bool {
         self.timed_out
@@ -159,9 +154,7 @@ impl Sequence {
         self.rolling_samples = if rolls { self.rolling_samples + 1 } else { 0 };
         let slow = observed.vehicle_speed_m_s < LOCK_SPEED_M_S;
         let Some(profile) = self.profile.filter(|_| self.state > State::Armed) else {
-            if self.state == State::Armed && (observed.stop || self.lasts(ARMED_MS))
-                || self.state == State::Done && observed.stop
-            {
+            if self.state == State::Armed && (observed.stop || self.lasts(ARMED_MS)) {
                 self.enter(State::Idle);
             }
             return 0.0;
