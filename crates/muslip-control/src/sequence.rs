@@ -10,7 +10,7 @@
 //! | `Armed` | dumped | `Arm` | `Start` -> `SpinUp`; `Stop` -> `Idle` | 60 s -> `Idle` |
 //! | `SpinUp` | dumped | `Start`; after a pause | start speed, and slip within ±0.05 for 0.2 s -> `Ramp` | 120 s -> `Fault(Timeout)` |
 //! | `Ramp` | by the program | speed reached | slip at the profile's skid slip -> `Skid`; program over, `Stop`, slip without a meaning, or vehicle below 5 m/s -> `Release` | the program's length |
-//! | `Skid` | holds what it had | skid slip | after the profile's hold, `Stop`, or slip without a meaning -> `Release` | 0.15 s at most |
+//! | `Skid` | holds what it had | skid slip | after the profile's hold, `Stop`, slip without a meaning, or vehicle below 5 m/s -> `Release` | 0.15 s at most |
 //! | `Release` | dumped | above | slip within ±0.05 for 50 ms, or vehicle below 5 m/s -> `Cool` | 1 s -> `Fault(Timeout)` |
 //! | `Cool` | dumped | wheel rolls | after the pause: more to do -> `SpinUp`, else -> `Done`; `Stop` -> `Done` | the profile's pause |
 //! | `Done` | dumped | all applications made | `Arm` -> `Armed`; `Stop` -> `Idle` | none |

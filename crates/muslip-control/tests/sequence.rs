@@ -1,5 +1,6 @@
 //! Every transition of a run at the sample and at the value that it belongs to, and not before: the table of
 //! `muslip_control::sequence`, row by row.
+#![allow(clippy::unwrap_used, reason = "a failed step fails the test")]
 
 use muslip_control::interlock::{LOCK_SPEED_M_S, ROLLING_SLIP};
 use muslip_control::rates::Rates;
@@ -96,11 +97,17 @@ impl Run {
     /// In its ramp, before its first sample there.
     fn ramping(profile: &Profile) -> Self {
         let mut run = Self::spinning_up(profile);
-        assert_eq!(run.after(200, ROLLING), State::Ramp);
+        run.ramps();
         run
     }
 
-    /// In a skid that half a second of ramp led to, before its first sample there.
+    /// From spin-up into the ramp: as long as it takes, and no sooner.
+    fn ramps(&mut self) {
+        assert_eq!(self.after(199, ROLLING), State::SpinUp);
+        assert_eq!(self.after(1, ROLLING), State::Ramp);
+    }
+
+    /// In a skid at half of full pressure, before its first sample there.
     fn skidding() -> Self {
         let mut run = Self::ramping(&ramp());
         run.after(249, BRAKED);
@@ -118,7 +125,7 @@ impl Run {
     /// Cooling after its first application, before its first sample there.
     fn cooling(profile: &Profile) -> Self {
         let mut run = Self::released(profile);
-        // The ramp's one sample, and what is missing of the fifty, with slip that says nothing before.
+        // One sample with slip, so that rolling is counted from nothing.
         assert_eq!(run.after(1, BRAKED), State::Release);
         assert_eq!(run.after(50, ROLLING), State::Cool);
         run
@@ -143,12 +150,18 @@ impl Run {
 
 #[test]
 fn only_what_rests_is_armed_only_what_is_armed_starts_only_a_fault_is_cleared() {
-    let in_each: [fn() -> Sequence; 7] = [
+    let in_each: [fn() -> Sequence; 8] = [
         || Sequence::new(RATES),
         || Run::armed().sequence,
         || Run::spinning_up(&ramp()).sequence,
         || Run::ramping(&ramp()).sequence,
-        || Run::released(&ramp()).sequence,
+        || Run::skidding().sequence,
+        || {
+            let mut run = Run::released(&ramp());
+            run.after(1_001, BRAKED);
+            assert!(run.sequence.timed_out());
+            run.sequence
+        },
         || Run::cooling(&ramp()).sequence,
         || Run::done().sequence,
     ];
@@ -170,6 +183,10 @@ fn only_what_rests_is_armed_only_what_is_armed_starts_only_a_fault_is_cleared() 
             (State::Fault, Some(Fault::Timeout))
         );
         assert!(!one.is_engaged() && !one.is_at_rest());
+        for observed in [ROLLING, stopped(ROLLING), BRAKED] {
+            assert_eq!(one.step(&observed, |_| 1.0).to_bits(), 0);
+            assert_eq!(one.state(), State::Fault);
+        }
         assert_eq!(one.arm(), Err(State::Fault));
         assert_eq!(one.start(&ramp()), Err(State::Fault));
         assert_eq!(one.clear(), Ok(()));
@@ -349,8 +366,9 @@ fn a_released_wheel_has_a_second_to_roll_for_a_twentieth() {
 fn applications_follow_each_other_after_a_pause_until_all_are_made() {
     let mut run = Run::cooling(&ramp());
     assert_eq!(run.after(499, BRAKED), State::Cool);
-    assert_eq!(run.after(1, BRAKED), State::SpinUp);
-    assert_eq!(run.after(200, ROLLING), State::Ramp);
+    // What has rolled while it cooled does not count.
+    assert_eq!(run.after(1, ROLLING), State::SpinUp);
+    run.ramps();
     assert_eq!(run.after(1, unknown()), State::Release);
     assert_eq!(run.after(50, ROLLING), State::Cool);
     assert_eq!(run.after(499, ROLLING), State::Cool);
@@ -360,7 +378,7 @@ fn applications_follow_each_other_after_a_pause_until_all_are_made() {
     // A second run counts anew.
     run.sequence.arm().unwrap();
     run.sequence.start(&ramp()).unwrap();
-    assert_eq!(run.after(200, ROLLING), State::Ramp);
+    run.ramps();
     assert_eq!(run.after(1, unknown()), State::Release);
     assert_eq!(run.after(50, ROLLING), State::Cool);
     assert_eq!(run.after(500, ROLLING), State::SpinUp);
