@@ -218,7 +218,8 @@ impl<'a> Chain<'a> {
 
     /// A wheel speed behind poles is late, wide and lopsided. Its delay is taken off, its width has columns of its own; what
     /// lopsidedness leaves of a balance goes by the second derivative of all that acts on the wheel, drag and brake
-    /// alike. A lag of the brake leaves that of the brake alone, and is told from it by this column.
+    /// alike. A lag of the brake leaves that of the brake alone, and is told from it by this column. In the tyre's row it
+    /// would stand for what is the tyre's: 6 false names instead of 3 on 60 campaigns that lack nothing.
     fn by_poles_of_wheel(&self, reach: f64) -> Triple {
         let Some(torque) = &self.series.torque else {
             return Triple::default();

@@ -156,7 +156,7 @@ pub struct Facts {
     pub acts_also_at: Option<Stage>,
     /// Its equation.
     pub equation: &'static str,
-    /// Whether it works through the force that is predicted, and not on the speeds or on another balance.
+    /// Whether the drag that is predicted depends on it: by the force, or by a slip that is wrong in all runs alike.
     pub through_force: bool,
     /// Channel of a recording that shows it.
     pub channel: &'static str,
