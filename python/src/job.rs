@@ -1,4 +1,4 @@
-//! Work on a thread of its own, so that Python stays free and Ctrl-C is heard.
+//! Work while Python stays free: on a thread of its own, so that Ctrl-C is heard, where it takes long enough for that.
 
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
@@ -14,9 +14,6 @@ use crate::failure::Failure;
 
 /// How often signals are looked for and progress is told.
 const BEAT: Duration = Duration::from_millis(50);
-
-/// Work on fewer bytes is over before anybody could interrupt it, and a thread would cost a good part of it.
-const SHORT_BYTES: u64 = 1 << 18;
 
 /// What unwinds through work that nobody waits for any more.
 struct Cancelled;
@@ -110,14 +107,15 @@ pub(crate) fn run<T: Send + 'static>(
     }
 }
 
-/// As [`run`], of a recording of so many bytes: of few, and where nobody is told of progress, on the thread that asks.
-pub(crate) fn run_on<T: Send + 'static>(
+/// As [`run`], on the thread that asks where the work is short and nobody is told of progress: a thread would cost as
+/// much again. An interrupt is heard behind it.
+pub(crate) fn run_short<T: Send + 'static>(
     py: Python<'_>,
     progress: Option<&Py<PyAny>>,
-    length_bytes: u64,
+    is_short: bool,
     work: impl FnOnce(&Reporter) -> Result<T, Failure> + Send + 'static,
 ) -> PyResult<T> {
-    if progress.is_some() || length_bytes >= SHORT_BYTES {
+    if progress.is_some() || !is_short {
         return run(py, progress, work);
     }
     let result = py.detach(|| guarded(|| work(&Reporter::new())))?;

@@ -73,6 +73,21 @@ pub(crate) fn estimator_of(word: Option<&str>) -> Result<Option<EstimatorKind>, 
     }
 }
 
+/// Work on fewer bytes is over before anybody could interrupt it.
+const SHORT_BYTES: u64 = 1 << 18;
+
+/// Whether an estimate of a recording is over at once: of text or of what is in memory, for a few bytes of a compressed
+/// file may be millions of samples, and a pipe has no end that is known.
+fn is_short(source: &Source) -> bool {
+    let is_plain = match source {
+        Source::File(path) => path
+            .extension()
+            .is_some_and(|kind| kind.eq_ignore_ascii_case("csv")),
+        Source::Memory(_) => true,
+    };
+    is_plain && (1..SHORT_BYTES).contains(&source.length_bytes())
+}
+
 /// What `muslip estimate` found.
 #[pyclass(frozen, module = "muslip._native")]
 pub(crate) struct Estimate {
@@ -160,8 +175,8 @@ pub(crate) fn estimate(
         None => None,
     };
     let (file, rig_map, rig) = (rig.file.clone(), rig.map.clone(), shown(rig.path_or_name()));
-    let length_bytes = source.length_bytes();
-    job::run_on(py, progress.as_ref(), length_bytes, move |reporter| {
+    let is_short = is_short(&source);
+    job::run_short(py, progress.as_ref(), is_short, move |reporter| {
         let map = map_of(map.as_ref())?.or(rig_map);
         let mut recording = source.open(map.as_ref())?;
         let all = 2 * recording.length_bytes().max(1);

@@ -362,11 +362,11 @@ impl Source {
         }
     }
 
-    /// Bytes of its file, or of its values in memory; 0 where there is no such file.
+    /// Bytes of its file, or of its values in memory; 0 where it is no file with an end, or none at all.
     #[must_use]
     pub fn length_bytes(&self) -> u64 {
         match self {
-            Self::File(path) => fs::metadata(path).map_or(0, |metadata| metadata.len()),
+            Self::File(path) => Recording::announced_length_bytes(path).unwrap_or(0),
             Self::Memory(memory) => Recording::of_memory(memory.clone()).length_bytes(),
         }
     }

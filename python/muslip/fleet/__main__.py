@@ -8,12 +8,17 @@ from typing import Any
 
 from muslip import MuslipError
 from muslip.fleet import diagnose, run, summary, to_delta
+from muslip.fleet._results import read
+from muslip.fleet._storage import opened
 
 
 def _table(path: str) -> Any:
     import pandas
 
-    return pandas.read_parquet(path, use_threads=False) if path.endswith(".parquet") else pandas.read_csv(path, dtype=str)
+    if path.endswith(".parquet"):
+        with opened(path) as stream:
+            return read(stream.read()).to_pandas(use_threads=False)
+    return pandas.read_csv(path, dtype=str)
 
 
 def _arguments() -> argparse.ArgumentParser:

@@ -50,6 +50,10 @@ def _receive(stream: IO[bytes]) -> Any:
     return pickle.loads(content)
 
 
+class Ended(Exception):
+    """Nobody waits for its work any more."""
+
+
 class Child:
     """A process of its own, started anew and not forked: the threads of an engine do not survive a fork.
 
@@ -63,8 +67,11 @@ class Child:
         self._folder = folder if folder is not None and os.path.isdir(folder) else None
         self._process: subprocess.Popen[bytes] | None = None
         self._answers: queue.SimpleQueue[Any] = queue.SimpleQueue()
+        self._is_over = False
 
     def _start(self) -> subprocess.Popen[bytes]:
+        if self._is_over:
+            raise Ended
         # One thread a child: the cores are shared by children.
         environment = {**os.environ, "RAYON_NUM_THREADS": "1", "PYTHONPATH": os.pathsep.join(map(os.path.abspath, sys.path))}
         process = subprocess.Popen(
@@ -151,8 +158,13 @@ class Child:
         self.close()
         return Died(f"signal {-code}" if code < 0 else f"status {code}")
 
+    def end(self) -> None:
+        """End it for good: whoever is at work with it is to end as well."""
+        self._is_over = True
+        self.close()
+
     def close(self) -> None:
-        """End it."""
+        """End its process; the next work starts another."""
         process, self._process = self._process, None
         if process is None:
             return

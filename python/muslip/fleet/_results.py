@@ -52,8 +52,8 @@ def full(row: Row, schema: pyarrow.Schema) -> Row:
     return {name: row.get(name) for name in schema.names}
 
 
-def _read(content: bytes, columns: list[str] | None = None) -> pyarrow.Table:
-    """The rows of a part, on this thread alone: one of Arrow's own that is still at it when Python ends aborts the process."""
+def read(content: bytes, columns: list[str] | None = None) -> pyarrow.Table:
+    """Parquet as a table, on this thread alone: one of Arrow's own that is still at it when Python ends aborts the process."""
     return pyarrow.parquet.ParquetFile(pyarrow.BufferReader(content), pre_buffer=False).read(columns, use_threads=False)
 
 
@@ -97,8 +97,12 @@ class Results:
         if content is None:
             return {}
         kind = key_of(self.schema)
-        rows = _read(content).to_pylist()
+        rows = read(content).to_pylist()
         return {row[kind]: row for row in rows}
+
+    def update(self, part: str, rows: dict[str, Row]) -> None:
+        """Put rows into a part as it is by now: who else is at it, a task that was thought lost, may have come further."""
+        self.write(part, (self.rows(part) | rows).values())
 
     def write(self, part: str, rows: Iterable[Row]) -> None:
         """Write a part anew, whole, its rows in the order of their keys."""
@@ -114,7 +118,7 @@ class Results:
         for part in parts:
             content = self.folder.read(part)
             if content is not None:
-                tables.append(_read(content, columns))
+                tables.append(read(content, columns))
         if not tables:
             return self.schema.empty_table().select(columns or self.schema.names)
         return pyarrow.concat_tables(tables)

@@ -280,7 +280,7 @@ def summary(results: str | os.PathLike[str], diagnoses: str | os.PathLike[str] |
     named = [table["mechanisms"].to_pylist()]
     if diagnoses is not None:
         named.append(_read(diagnoses, GROUPS)["mechanisms"].to_pylist())
-    every = table.drop_columns(["mechanisms"]).to_pandas()
+    every = table.drop_columns(["mechanisms"]).to_pandas(use_threads=False)
     failed = every["error"].notna()
     frame = every[~failed].sort_values("path").reset_index(drop=True)
     if frame.empty:

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import contextlib
+import itertools
 import time
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Generator, Iterable, Sequence
 from dataclasses import dataclass
 
 import muslip
@@ -84,7 +85,7 @@ class Plan:
     """Where relative paths begin."""
 
 
-def _guarded(child: _child.Child, works: list[Work], needed: tuple[Rigs, Maps, Options]) -> Iterator[Row | None]:
+def _guarded(child: _child.Child, works: list[Work], needed: tuple[Rigs, Maps, Options]) -> Generator[Row | None, None, None]:
     """The result of one after the other, by a child; a row as well where it takes too long, or its process dies of it."""
     timeout_s = needed[2].timeout_s
     left = list(works)
@@ -97,7 +98,7 @@ def _guarded(child: _child.Child, works: list[Work], needed: tuple[Rigs, Maps, O
         try:
             for result in child.each(_worked, given, *needed, timeout_s=timeout_s):
                 del left[0]
-                deaths = 0
+                is_alone, deaths = False, 0
                 yield result
                 start = time.perf_counter()
             continue
@@ -113,7 +114,7 @@ def _guarded(child: _child.Child, works: list[Work], needed: tuple[Rigs, Maps, O
                 continue
             failed = {"error": f"error: its process died twice: {error}", "seconds": time.perf_counter() - start}
         del left[0]
-        deaths = 0
+        is_alone, deaths = False, 0
         yield failed
 
 
@@ -133,22 +134,29 @@ def work_on(parts: Sequence[Part], plan: Plan, child: _child.Child) -> list[int]
             made = (plan.asked.version, plan.asked.settings_of(unit))
             is_known = before is not None and plan.resume and (before["version"], before["settings"]) == made
             works.append(plan.asked.work_of(unit, before["fingerprint"] if before is not None and is_known else None))
-    results = _guarded(child, works, plan.asked.needed_by(unit for _, units in parts for unit in units))
-    for (name, units), rows in zip(parts, there, strict=True):
-        written, is_changed = time.monotonic(), False
-        for unit in units:
-            before, result = rows.get(unit.key), next(results)
-            if result is not None:
-                row = plan.asked.made(unit, result)
-            else:
-                assert before is not None
-                row = {**before, **unit.labels()}
-            row = full(row, plan.results.schema)
-            is_changed |= row != before
-            rows[unit.key] = row
-            if is_changed and time.monotonic() - written > FLUSH_S:
-                plan.results.write(name, rows.values())
-                written, is_changed = time.monotonic(), False
-        if is_changed:
-            plan.results.write(name, rows.values())
+    needed = plan.asked.needed_by(unit for _, units in parts for unit in units)
+    with contextlib.closing(_guarded(child, works, needed)) as results:
+        for (name, units), rows in zip(parts, there, strict=True):
+            _bring(name, rows, zip(units, itertools.islice(results, len(units)), strict=True), plan)
     return [len(units) for _, units in parts]
+
+
+def _bring(name: str, there: dict[str, Row], results: Iterable[tuple[Unit, Row | None]], plan: Plan) -> None:
+    """Bring one part up to date with results, and every few seconds as far as they have come."""
+    changed: dict[str, Row] = {}
+    written = time.monotonic()
+    for unit, result in results:
+        before = there.get(unit.key)
+        if result is not None:
+            row = plan.asked.made(unit, result)
+        else:
+            assert before is not None
+            row = {**before, **unit.labels()}
+        row = full(row, plan.results.schema)
+        if row != before:
+            changed[unit.key] = row
+        if changed and time.monotonic() - written > FLUSH_S:
+            plan.results.update(name, changed)
+            written, changed = time.monotonic(), {}
+    if changed:
+        plan.results.update(name, changed)
