@@ -2,6 +2,7 @@
 
 use anyhow::Result;
 
+use crate::setup;
 use crate::step::{cargo, run};
 
 /// Runs the three; the first that fails ends it.
@@ -18,6 +19,7 @@ pub fn run_all() -> Result<()> {
             "--all-features",
         ],
     )?;
+    setup::rust_target("thumbv7em-none-eabihf")?;
     clippy(
         "clippy of the firmware's image",
         &[
