@@ -50,6 +50,17 @@ def test_a_row_is_the_estimate_and_plain(made):
     assert other["settings"] != row["settings"] and other["fingerprint"] == row["fingerprint"]
 
 
+def test_of_two_tasks_at_one_part_the_slower_keeps_what_the_faster_added(made, tmp_path):
+    rig, paths = made
+    slower, faster = (_results.Results.made(str(tmp_path), _results.RECORDINGS, 1) for _ in range(2))
+    rows = {path: process(path, rig) for path in map(os.fspath, paths[:2])}
+    part = slower.part_of(os.fspath(paths[0]))
+    assert slower.rows(part) == {}
+    for task, path in zip((faster, slower), rows, strict=True):
+        task.update(part, {path: rows[path]})
+    assert slower.rows(part) == {row["path"]: row for row in rows.values()}
+
+
 def test_what_goes_wrong_is_a_row_with_the_commands_line(made, tmp_path):
     rig, paths = made
     bad = tmp_path / "bad.csv"

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterable
 from typing import NamedTuple, cast
 
 import pyarrow
@@ -101,12 +100,11 @@ class Results:
         return {row[kind]: row for row in rows}
 
     def update(self, part: str, rows: dict[str, Row]) -> None:
-        """Put rows into a part as it is by now: who else is at it, a task that was thought lost, may have come further."""
-        self.write(part, (self.rows(part) | rows).values())
+        """Put rows into a part and write it whole, its rows in the order of their keys.
 
-    def write(self, part: str, rows: Iterable[Row]) -> None:
-        """Write a part anew, whole, its rows in the order of their keys."""
-        ordered = sorted(rows, key=lambda row: str(row[key_of(self.schema)]))
+        They go into the part as it is by now: who else is at it, a task that was thought lost, may have come further.
+        """
+        ordered = [row for _, row in sorted((self.rows(part) | rows).items())]
         content = pyarrow.BufferOutputStream()
         pyarrow.parquet.write_table(pyarrow.Table.from_pylist(ordered, self.schema), content)
         self.folder.write(part, content.getvalue().to_pybytes())

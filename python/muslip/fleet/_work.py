@@ -89,16 +89,16 @@ def _guarded(child: _child.Child, works: list[Work], needed: tuple[Rigs, Maps, O
     """The result of one after the other, by a child; a row as well where it takes too long, or its process dies of it."""
     timeout_s = needed[2].timeout_s
     left = list(works)
-    is_alone, deaths = False, 0
+    deaths = 0
     while left:
         # A row is charged with its work, and not with the start of a process.
         child.ready()
         start = time.perf_counter()
-        given = left[:1] if is_alone else list(left)
+        given = left[:1] if deaths else list(left)
         try:
             for result in child.each(_worked, given, *needed, timeout_s=timeout_s):
                 del left[0]
-                is_alone, deaths = False, 0
+                deaths = 0
                 yield result
                 start = time.perf_counter()
             continue
@@ -109,12 +109,12 @@ def _guarded(child: _child.Child, works: list[Work], needed: tuple[Rigs, Maps, O
                 failed["fingerprint"] = child.call(fingerprint_of, left[0][0], timeout_s=timeout_s)
         except _child.Died as error:
             # Once more, and one at a time: who was killed from outside is not at fault, nor is who came before the one that is.
-            is_alone, deaths = True, deaths + 1
+            deaths += 1
             if deaths < 2:
                 continue
             failed = {"error": f"error: its process died twice: {error}", "seconds": time.perf_counter() - start}
         del left[0]
-        is_alone, deaths = False, 0
+        deaths = 0
         yield failed
 
 
