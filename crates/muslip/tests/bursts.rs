@@ -189,6 +189,16 @@ proptest! {
     }
 }
 
+/// The mean of this burst is beside the curve: good readings after it must end it, so that they do not count for the
+/// next one.
+#[test]
+fn good_readings_between_two_bursts_end_the_first() {
+    let (bursts, glitch) = ([(772, 12), (844, 40)], Glitch::Random(9.060_583_365_428_81));
+    let seed = 2_347_301_947_675_581_200;
+    assert!(most_off::<f32>(Slips::Ramps, None, &bursts, glitch, seed) < 0.02);
+    assert!(most_off::<f64>(Slips::Ramps, None, &bursts, glitch, seed) < 0.02);
+}
+
 /// Samples from a step of friction until what the estimate says of it at a slip of 0.12 is right to 10 % for good.
 fn samples_to_follow<T: Real + Into<f64>>(slips: impl Fn(usize) -> f64, seed: u64) -> usize {
     let mut noise = Noise::seeded(seed);

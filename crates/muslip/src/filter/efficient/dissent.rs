@@ -137,13 +137,26 @@ impl<T: Real> Dissent<T> {
 
     /// Takes a reading that passed the gate, and would have passed one about what was rejected as well: slip so small
     /// that it does not tell which is right. Whether it is such a one.
-    pub(super) fn is_undecided(&mut self, [sech, friction]: [T; 2], tolerated: T) -> bool {
+    ///
+    /// Readings that scatter have no level to pass, and one beside the curve's own decides nothing at any slip:
+    /// good readings after such a burst would count as rejected, and the next burst be believed for their number.
+    pub(super) fn is_undecided(
+        &mut self,
+        [sech, friction]: [T; 2],
+        [peak_friction, noise]: [T; 2],
+        tolerated: T,
+    ) -> bool {
         let readings = self.readings();
         if readings == 0 || readings >= MOST_COUNTED || self.pending & OPEN != 0 {
             return false;
         }
-        let off = friction - self.friction / self.law * sech;
-        let undecided = off * off <= tolerated;
+        let level = self.friction / self.law;
+        let about = self.square - level * self.friction;
+        let apart = level - peak_friction;
+        let off = friction - level * sech;
+        let undecided = off * off <= tolerated
+            && apart * apart > tolerated
+            && about <= agreeing(noise, count::<T>(readings));
         if undecided {
             self.add(sech, friction);
         }
@@ -158,13 +171,17 @@ impl<T: Real> Dissent<T> {
         let about = self.square - level * self.friction;
         let spread = self.law - self.shape * self.shape / number;
         let off = level - peak_friction;
-        let unit = noise * (number + T::from_f64(FEW));
         // Off by the same amount each, or all of the same value.
         let apart = (off * off).min(level * level) * spread;
         level > T::ZERO
-            && about <= T::from_f64(AGREEING) * unit
+            && about <= agreeing(noise, number)
             && apart > T::from_f64(share) * about + T::from_f64(beyond) * noise
     }
+}
+
+/// Sum of squares about their level up to which so many readings agree.
+fn agreeing<T: Real>(noise: T, number: T) -> T {
+    T::from_f64(AGREEING) * noise * (number + T::from_f64(FEW))
 }
 
 /// A small number, bit by bit: the scalar is made of constants only.

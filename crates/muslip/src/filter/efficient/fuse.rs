@@ -215,10 +215,10 @@ impl<T: Real> Estimate<T> {
             let degrees = T::from_f64(DECLARED_NOISE_SAMPLES) + (self.count - T::TWO).max(T::ZERO);
             let believed = self.noise_factor.min(T::from_f64(LARGEST_GATE_FACTOR));
             let noise = believed * variance * (T::ONE + T::from_f64(UNLEARNT_NOISE) / degrees);
+            let reading = [expected.by_peak_friction, friction];
+            let known = [self.peak_friction, expected.noise];
             if suspect && squared > gate * (expected.signal + noise) {
                 let seen = (self.seen, config.memory);
-                let reading = [expected.by_peak_friction, friction];
-                let known = [self.peak_friction, expected.noise];
                 if !self.dissent.take(seen, reading, known) {
                     if in_bin <= T::ZERO && config.memory.is_none() {
                         // Alone in its bin it costs nothing to keep it in mind.
@@ -240,10 +240,9 @@ impl<T: Real> Estimate<T> {
                     suspect = false;
                 }
             } else if !self.dissent.is_none()
-                && !self.dissent.is_undecided(
-                    [expected.by_peak_friction, friction],
-                    T::from_f64(SUSPECT) * expected.noise,
-                )
+                && !self
+                    .dissent
+                    .is_undecided(reading, known, T::from_f64(SUSPECT) * expected.noise)
             {
                 // It has passed: those rejected before it were glitches, and one in its own bin stays no longer.
                 if self.dissent.end(term.index) {
