@@ -289,14 +289,16 @@ fn squares_by_best_law(data: &Data, judged: &Judged) -> Vec<f64> {
 
 /// Shortest memory in s that is named: a filtered reading of the brake holds less noise than the reading itself, which
 /// looks like a short lag, so there its descriptor's smallest useful effect holds. None is shorter than the recording's
-/// step: how a reading changes between two samples is not known.
+/// step: how a reading changes between two samples is not known. An acceleration takes two steps to be seen, with the
+/// torque that enters at both.
 fn least_memory_s(data: &Data, id: Id, entry: usize) -> f64 {
-    let least_s = if id.balance() == Balance::Wheel {
-        (data.catalogue.get(entry).guide().smallest_size)(&data.context)
+    let (least_s, steps) = if id.balance() == Balance::Wheel {
+        let smallest_s = (data.catalogue.get(entry).guide().smallest_size)(&data.context);
+        (smallest_s, 2.0)
     } else {
-        LEAST_MEMORY_S
+        (LEAST_MEMORY_S, 1.0)
     };
-    least_s.max(data.context.dt / data.averaged as f64)
+    least_s.max(steps * data.context.dt / data.averaged as f64)
 }
 
 /// Gain of the least effect that is worth a name, nats.
