@@ -16,7 +16,7 @@ use crate::link::LinkEnd;
 /// 0 is the memory fault's: an overflow of the stack must be one in every interrupt.
 const LINK_PRIORITY: u8 = 1;
 /// Of sampling.
-const SAMPLING_PRIORITY: u8 = 2;
+pub const SAMPLING_PRIORITY: u8 = 2;
 
 /// Does something with sampling held off, and the link not.
 pub fn without_sampling<T>(work: impl FnOnce() -> T) -> T {

@@ -44,6 +44,12 @@ pub trait Chip {
         cortex_m::peripheral::DWT::cycle_count()
     }
 
+    /// Whether the timer has come for something else than a sample, and that is done.
+    #[inline]
+    fn timer_is_taken() -> bool {
+        false
+    }
+
     /// The sampling interrupt has begun.
     fn sampled() {}
 

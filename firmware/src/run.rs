@@ -42,6 +42,13 @@ static SAMPLER: InterruptCell<Sampler> = InterruptCell::new();
 /// The sampling interrupt, 1,000 times a second by the timer or once for each frame of the emulator.
 #[exception]
 fn SysTick() {
+    if !This::timer_is_taken() {
+        sample();
+    }
+}
+
+/// What the sampling interrupt does.
+pub(crate) fn sample() {
     let watch = Stopwatch::start();
     #[allow(unsafe_code, reason = "what the sampling interrupt owns")]
     // SAFETY: only this interrupt calls it.
@@ -119,12 +126,12 @@ impl Loop {
             while let Some(raw) = self.samples.pop() {
                 self.work(&raw);
             }
+            if !log::is_empty() && This::log(log::pop) {
+                continue;
+            }
             if This::stays_awake() {
                 // Without a look at any register: those are slow in the emulator.
                 cortex_m::asm::delay(1_000);
-                continue;
-            }
-            if !log::is_empty() && This::log(log::pop) {
                 continue;
             }
             self.sleep();

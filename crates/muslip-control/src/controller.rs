@@ -491,7 +491,7 @@ impl Controller {
             .take(parameters)
             .map_err(|_| Refusal::Parameter(NOISE_FIELD))?;
         self.parameters = *parameters;
-        self.conversion = Conversion::new(parameters, self.identity.rates);
+        self.conversion.take(parameters);
         self.interlocks.take(parameters);
         self.tare = None;
         self.store(actuators).map_err(|NotStored| Refusal::Storage)

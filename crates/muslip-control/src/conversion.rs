@@ -44,6 +44,15 @@ impl Conversion {
         }
     }
 
+    /// Takes parameters; the encoders turn on.
+    pub fn take(&mut self, parameters: &Parameters) {
+        self.wheel.take(&parameters.wheel_encoder);
+        self.vehicle.take(&parameters.vehicle_encoder);
+        self.vehicle_radius_m = parameters.vehicle_encoder_radius_m;
+        self.drag = parameters.drag;
+        self.normal = parameters.normal;
+    }
+
     /// Takes new zeros.
     pub fn set_zero_codes(&mut self, drag: i32, normal: i32) {
         self.drag.zero_code = drag;

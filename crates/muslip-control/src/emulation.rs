@@ -8,6 +8,10 @@ use serde::{Deserialize, Serialize};
 use crate::board::RawSample;
 use crate::brake::BrakeOutput;
 
+/// Base-two logarithm of the nanoseconds that the emulator takes an instruction for at the wire's pace: 16, which is 2.7 cycles at
+/// 168 MHz, where the cycle model of the Cortex-M4 has 1.5 for the control step.
+pub const NS_PER_INSTRUCTION_LOG2: u32 = 4;
+
 /// From the simulator.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub enum ToFirmware {
@@ -37,6 +41,14 @@ pub enum ToFirmware {
     ExhaustStack,
     /// Raise the interrupt that cannot be masked, as the crystal's end would.
     NonMaskable,
+    /// The next sample at the pace of the wire, for which the emulator goes at
+    /// [`NS_PER_INSTRUCTION_LOG2`]; the first of them begins that.
+    Pace {
+        /// What the sensors read.
+        raw: RawSample,
+        /// Bytes on the link that the wire brings from now on.
+        link_bytes: u16,
+    },
 }
 
 /// What can hold an interrupt off, the most of each so far, in instructions.
@@ -103,5 +115,24 @@ pub enum FromFirmware {
         panic: bool,
         /// What the valves were told last.
         output: BrakeOutput,
+    },
+    /// A sample at the pace of the wire is over, whether its work is done or not.
+    Paced {
+        /// Samples raised.
+        raised: u32,
+        /// Samples whose work was done.
+        worked: u32,
+        /// Times that a sample was raised before the last was done.
+        late: u32,
+        /// What the valves were told last.
+        output: BrakeOutput,
+        /// Bytes sent on the link so far.
+        link_sent: u32,
+        /// Longest that a received byte waited to be taken, in core cycles.
+        waited: u32,
+        /// Bytes that the wire still has to bring.
+        ready: u16,
+        /// Received bytes that were lost.
+        lost: u32,
     },
 }

@@ -60,6 +60,10 @@ pub struct SpeedMeter {
     speed_rad_s: f32,
 }
 
+fn radians_per_pulse(encoder: &EncoderParameters) -> f32 {
+    core::f32::consts::TAU / f32::from(encoder.pulses_per_revolution.max(1))
+}
+
 /// What an encoder says at one sample.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Speed {
@@ -77,8 +81,7 @@ impl SpeedMeter {
     /// At standstill.
     pub fn new(encoder: &EncoderParameters, rates: Rates) -> Self {
         Self {
-            radians_per_pulse: core::f32::consts::TAU
-                / f32::from(encoder.pulses_per_revolution.max(1)),
+            radians_per_pulse: radians_per_pulse(encoder),
             tick_s: rates.tick_s(),
             standstill_ticks: rates.edge_timer_hz() / 4,
             reversed: encoder.reversed,
@@ -89,6 +92,21 @@ impl SpeedMeter {
             measured_rad_s: 0.0,
             speed_rad_s: 0.0,
         }
+    }
+
+    /// Takes an encoder's parameters; what was measured stays, in their units.
+    pub fn take(&mut self, encoder: &EncoderParameters) {
+        let before = *self;
+        self.radians_per_pulse = radians_per_pulse(encoder);
+        self.reversed = encoder.reversed;
+        let ratio = self.radians_per_pulse / before.radians_per_pulse;
+        let scale = if self.reversed == before.reversed {
+            ratio
+        } else {
+            -ratio
+        };
+        self.measured_rad_s *= scale;
+        self.speed_rad_s *= scale;
     }
 
     /// Takes the reading of the next sample.
@@ -213,6 +231,29 @@ mod tests {
                 edges: (self.pulses.floor() as i64 * 2 + 1) as u16,
                 edge_ticks: START_TICKS.wrapping_add(ticks(self.edge_s)),
                 age_ticks: ticks(self.now_s).wrapping_sub(ticks(self.edge_s)),
+            }
+        }
+    }
+
+    #[test]
+    fn parameters_taken_while_it_turns_scale_the_speed_and_lose_no_pulse() {
+        for (pulses_per_revolution, reversed, scale) in
+            [(500, false, 1.0), (250, false, 2.0), (500, true, -1.0)]
+        {
+            let (mut encoder, mut meter) = Encoder::new(500);
+            for _ in 0..100 {
+                meter.update(&encoder.sample(65.0));
+            }
+            meter.take(&EncoderParameters {
+                pulses_per_revolution,
+                reversed,
+            });
+            for _ in 0..100 {
+                let speed = meter.update(&encoder.sample(65.0)).rad_s;
+                assert!(
+                    (f64::from(speed) / (65.0 * scale) - 1.0).abs() < 5e-5,
+                    "{speed}"
+                );
             }
         }
     }

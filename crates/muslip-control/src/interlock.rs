@@ -100,8 +100,8 @@ pub struct Interlocks {
     wheel_change_rad_s2: f32,
     vehicle_change_rad_s2: f32,
     locked_s: f32,
-    last_wheel_rad_s: f32,
-    last_vehicle_rad_s: f32,
+    last_wheel_rad_s: Option<f32>,
+    last_vehicle_rad_s: Option<f32>,
     last_codes: [i32; 2],
     /// How often each channel's code has been the same.
     repeats: [u8; 2],
@@ -123,8 +123,8 @@ impl Interlocks {
             wheel_change_rad_s2: wheel_change_rad_s2(parameters),
             vehicle_change_rad_s2: VEHICLE_CHANGE_M_S2 / parameters.vehicle_encoder_radius_m,
             locked_s: 0.0,
-            last_wheel_rad_s: 0.0,
-            last_vehicle_rad_s: 0.0,
+            last_wheel_rad_s: None,
+            last_vehicle_rad_s: None,
             last_codes: [i32::MIN; 2],
             repeats: [0; 2],
             last_forces_n: [0.0; 2],
@@ -239,7 +239,7 @@ impl Interlocks {
         );
         faults.add_if(wheel == Plausible::Lost, Fault::WheelSensorLost);
         faults.add_if(wheel == Plausible::OutOfRange, Fault::WheelSensorOutOfRange);
-        self.last_wheel_rad_s = wheel_rad_s;
+        self.last_wheel_rad_s = Some(wheel_rad_s);
         let vehicle = plausible(
             &converted.vehicle,
             self.last_vehicle_rad_s,
@@ -251,7 +251,7 @@ impl Interlocks {
             vehicle == Plausible::OutOfRange,
             Fault::VehicleSensorOutOfRange,
         );
-        self.last_vehicle_rad_s = converted.vehicle.rad_s;
+        self.last_vehicle_rad_s = Some(converted.vehicle.rad_s);
     }
 
     /// What the brake takes up at the torque that it is told, which a low friction of its lining only lowers.
@@ -344,7 +344,12 @@ enum Plausible {
 }
 
 /// Whether a speed can have come from the one a sample before it by a change of at most `change_rad_s2`.
-fn plausible(speed: &Speed, last_rad_s: f32, change_rad_s2: f32, sample_s: f32) -> Plausible {
+fn plausible(
+    speed: &Speed,
+    last_rad_s: Option<f32>,
+    change_rad_s2: f32,
+    sample_s: f32,
+) -> Plausible {
     if !speed.pulsed {
         // Noise of 5 rad/s and a tenth cover the quantum of a coarse tone ring.
         let slowest =
@@ -356,9 +361,11 @@ fn plausible(speed: &Speed, last_rad_s: f32, change_rad_s2: f32, sample_s: f32) 
         };
     }
     // The pulses span up to one sample more than the samples they are read at.
-    let largest = SPEED_NOISE_RAD_S + 0.1 * last_rad_s.abs() + change_rad_s2 * 2.0 * sample_s;
-    let change = (speed.rad_s - last_rad_s).abs();
-    if change > largest || speed.rad_s < -BACKWARD_RAD_S {
+    let changed = last_rad_s.is_some_and(|last_rad_s| {
+        let largest = SPEED_NOISE_RAD_S + 0.1 * last_rad_s.abs() + change_rad_s2 * 2.0 * sample_s;
+        (speed.rad_s - last_rad_s).abs() > largest
+    });
+    if changed || speed.rad_s < -BACKWARD_RAD_S {
         Plausible::OutOfRange
     } else {
         Plausible::Yes

@@ -11,7 +11,7 @@ use muslip_record::{FRAME_BYTES, FrameReader, Parameters, encode};
 use stm32f4::stm32f405::{Interrupt, NVIC, TIM2, USART3, interrupt};
 
 use super::settings::CYCLES_PER_SAMPLE;
-use super::uart;
+use super::{uart, wire};
 use crate::bits::{low_u8, low_u16};
 use crate::cell::InterruptCell;
 use crate::chip::Took;
@@ -111,9 +111,12 @@ pub fn output() -> BrakeOutput {
 
 impl Sensors for EmulatedSensors {
     fn read(&mut self) -> RawSample {
+        if wire::is_on() {
+            wire::wait_for_buses();
+        }
         #[allow(unsafe_code, reason = "what the emulator's interrupt owns")]
-        // SAFETY: USART3's interrupt has written it before the sampling interrupt was raised, and cannot run
-        // while that one does, which is above it.
+        // SAFETY: USART3's interrupt, or the wire's tick, has written it before the sampling interrupt was raised. The first
+        // cannot run while that one does, which is above it; the second writes once a sample, before it is raised.
         let mailbox = unsafe { MAILBOX.get() };
         mailbox.copied().unwrap_or_default()
     }
@@ -139,6 +142,7 @@ impl Actuators for EmulatedActuators {
 /// Waits until the link bytes that belong before this sample have arrived.
 pub fn await_link() {
     while is_emulated()
+        && !wire::is_on()
         && (link::totals()
             .0
             .wrapping_sub(EXPECTED.load(Ordering::Relaxed)))
@@ -159,7 +163,7 @@ pub fn burn() {
 
 /// Answers the simulator after a sample's work; `totals` are samples raised, worked on and late so far.
 pub fn answer(tick: u32, took: &Took, delays: Delays, stack_bytes: u32, totals: [u32; 3]) {
-    if !is_emulated() {
+    if !is_emulated() || wire::is_on() {
         return;
     }
     if FREE_RUN.load(Ordering::Relaxed) {
@@ -233,6 +237,21 @@ pub fn say(message: &FromFirmware) {
     }
 }
 
+/// Takes the next sample at the wire's pace, byte by byte; the bytes that the link brings with it.
+#[allow(unsafe_code, reason = "what the emulator's interrupts own")]
+pub fn heard_sample(mut byte: impl FnMut() -> u8) -> u16 {
+    // SAFETY: the wire's tick calls it, while USART3's interrupt is masked.
+    let Some(reader) = (unsafe { RECEIVER.get() }) else {
+        return 0;
+    };
+    loop {
+        if let Some(Ok(ToFirmware::Pace { raw, link_bytes })) = reader.push(byte()) {
+            put(&raw, 0);
+            return link_bytes;
+        }
+    }
+}
+
 #[interrupt]
 fn USART3() {
     #[allow(unsafe_code, reason = "what the emulator's interrupt owns")]
@@ -280,6 +299,12 @@ fn obey(message: &ToFirmware) {
             timer.clear_current();
             timer.enable_interrupt();
             timer.enable_counter();
+        }
+        // The first; then the wire's tick hears them.
+        ToFirmware::Pace { raw, .. } => {
+            put(raw, 0);
+            totals::reset();
+            wire::start();
         }
         ToFirmware::HardFault => cortex_m::asm::udf(),
         ToFirmware::ExhaustStack => {

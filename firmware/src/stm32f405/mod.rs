@@ -23,6 +23,8 @@ mod start;
 #[cfg(target_os = "none")]
 #[allow(unsafe_code, reason = "raw register values")]
 mod uart;
+#[cfg(target_os = "none")]
+mod wire;
 
 #[cfg(target_os = "none")]
 pub use chip::Stm32f405;

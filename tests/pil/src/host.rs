@@ -40,6 +40,8 @@ pub struct Heard {
     pub hello: Option<Hello>,
     /// The newest answer and its command's number.
     pub answer: Option<(u16, Answer)>,
+    /// Answers, in all.
+    pub answers: u64,
     /// The newest status.
     pub status: Option<Status>,
     /// The newest estimate.
@@ -186,6 +188,7 @@ impl Host {
             Telemetry::Hello(hello) => heard.hello = Some(hello),
             Telemetry::Answer { command, answer } => {
                 heard.answer = Some((command, answer));
+                heard.answers += 1;
                 if self.open.is_some_and(|(sequence, ..)| sequence == command) {
                     self.open = None;
                 }

@@ -23,7 +23,7 @@ struct Arguments {
     image: PathBuf,
     /// The image that panics.
     panic_image: PathBuf,
-    /// Simulated seconds of the endurance run.
+    /// Simulated seconds of the endurance run, and of the one at true pace.
     #[arg(long, default_value_t = 10)]
     seconds: u32,
     /// Only scenarios whose name contains this.
@@ -79,6 +79,10 @@ fn main() -> Result<()> {
         (
             "endurance",
             Box::new(|| scenarios::endurance(image, arguments.seconds)),
+        ),
+        (
+            "true pace",
+            Box::new(|| scenarios::true_pace(image, arguments.seconds)),
         ),
     ];
     let mut worst = Worst::default();

@@ -38,6 +38,14 @@ impl Qemu {
     /// # Errors
     /// QEMU cannot be started, or the image says nothing.
     pub fn start(image: &Path) -> Result<(Self, FromFirmware)> {
+        Self::start_at(image, 0)
+    }
+
+    /// As [`Qemu::start`], an instruction taken for so many nanoseconds, as their base-two logarithm.
+    ///
+    /// # Errors
+    /// As [`Qemu::start`].
+    pub fn start_at(image: &Path, ns_per_instruction_log2: u32) -> Result<(Self, FromFirmware)> {
         let folder = tempfile::tempdir()?;
         let path = |name: &str| folder.path().join(name);
         let link = UnixListener::bind(path("link"))?;
@@ -45,8 +53,9 @@ impl Qemu {
         let log = path("log");
         // The n-th serial is USARTn. shift=0: one instruction is 1 ns of the guest's time, so that its timers
         // count instructions; sleep=off: time jumps to the next event when the core sleeps.
+        let count = format!("shift={ns_per_instruction_log2},sleep=off");
         let mut child = Command::new(EMULATOR)
-            .args(["-M", "netduinoplus2", "-icount", "shift=0,sleep=off"])
+            .args(["-M", "netduinoplus2", "-icount", &count])
             .args(["-display", "none", "-monitor", "none", "-nodefaults"])
             .arg("-serial")
             .arg(format!("file:{}", log.display()))
@@ -155,6 +164,27 @@ impl Qemu {
             ensure!(count > 0, "the emulator is gone");
             self.waiting.extend(bytes.iter().take(count));
         }
+    }
+
+    /// One sample at the pace of the wire, which brings these bytes during it; what the image says of the sample before,
+    /// and the bytes that it has sent since.
+    ///
+    /// # Errors
+    /// As [`Qemu::hear`].
+    pub fn pace(&mut self, raw: &RawSample, link: &[u8]) -> Result<(FromFirmware, Vec<u8>)> {
+        self.say(&ToFirmware::Pace {
+            raw: *raw,
+            link_bytes: u16::try_from(link.len())?,
+        })?;
+        self.link.write_all(link)?;
+        let said = self.hear()?;
+        let mut sent = Vec::new();
+        if let FromFirmware::Paced { link_sent, .. } = said {
+            sent = vec![0; (link_sent - self.link_from) as usize];
+            self.link.read_exact(&mut sent)?;
+            self.link_from = link_sent;
+        }
+        Ok((said, sent))
     }
 
     /// Lets the image's own timer run.

@@ -37,6 +37,20 @@ fn parameters_are_taken_whole_or_not_at_all_and_only_at_rest() {
     assert_eq!(*bench.controller.parameters(), Parameters::default());
 }
 
+#[test]
+fn a_rig_that_rolls_arms_right_after_its_parameters_are_set() {
+    let mut bench = Bench::new();
+    bench.run(100);
+    let parameters = Parameters::default();
+    assert_eq!(
+        bench.say(Command::SetParameters { parameters }),
+        Answer::Done
+    );
+    assert_eq!(bench.say(Command::Arm), Answer::Done);
+    bench.run(10);
+    assert_eq!(bench.state(), State::Armed);
+}
+
 /// A skid on a road of peak 0.85 at slip 0.14 under noise of 3 %; true where it ended without a fault, and something was
 /// estimated.
 fn goes_through_a_skid(parameters: Parameters) -> bool {

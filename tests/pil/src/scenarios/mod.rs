@@ -9,6 +9,7 @@ mod estimators;
 mod guards;
 mod interlocks;
 mod link;
+mod pace;
 mod runs;
 
 use muslip_record::{Profile, Program};
@@ -20,6 +21,7 @@ pub use estimators::{compensation, worst_estimate};
 pub use guards::guards;
 pub use interlocks::interlocks;
 pub use link::{back_pressure, byte_by_byte, corruption, greets};
+pub use pace::true_pace;
 pub use runs::{full_lock, ramps, slip_hold, steps};
 
 /// Cycles that a sample has at 168 MHz.
