@@ -1,10 +1,18 @@
 //! A file of any length converted some rows at a time. Channels with times of their own go side by side: of each one only what the raster's next rows
 //! need is in memory. Their times are gone through once before, because rates, gaps and the raster hang on all of them.
 
-use std::hash::{DefaultHasher, Hash, Hasher};
+mod grid;
+mod sink;
+mod track;
+
 use std::io;
 use std::mem::take;
 
+pub use self::sink::{RowSink, StreamError};
+
+use self::grid::{Grid, MOST_ROWS, Next, Raster};
+use self::sink::Out;
+use self::track::{Group, Track};
 use crate::convert::{self, Prepared, Told};
 use crate::error::{FormatError, Problem};
 use crate::made::{Fault, Made};
@@ -12,20 +20,8 @@ use crate::map::Map;
 use crate::raster::{Bringing, Done};
 use crate::roles::TIME;
 use crate::source::{Channel, Series};
-use crate::source_file::{FilePieces, SourceFile};
+use crate::source_file::SourceFile;
 use crate::steps::Steps;
-
-/// Most rows that the sink gets at a time, and about as many readings of a channel that is faster.
-const MOST_ROWS: usize = 1 << 16;
-
-/// Who takes the rows of a conversion.
-pub trait RowSink {
-    /// Takes rows, by column: `time_s` first.
-    ///
-    /// # Errors
-    /// The sink's own.
-    fn rows(&mut self, columns: &[Vec<f64>]) -> io::Result<()>;
-}
 
 /// What a conversion came to.
 #[derive(Debug, Clone, PartialEq)]
@@ -40,17 +36,6 @@ pub struct Streamed {
     pub made: Made,
 }
 
-/// Why there is none.
-#[derive(Debug, thiserror::Error)]
-pub enum StreamError {
-    /// The file.
-    #[error(transparent)]
-    Format(#[from] FormatError),
-    /// The sink.
-    #[error(transparent)]
-    Sink(#[from] io::Error),
-}
-
 /// A conversion that can go some rows at a time.
 #[derive(Debug)]
 pub struct Stream {
@@ -58,19 +43,6 @@ pub struct Stream {
     groups: Vec<Group>,
     /// The group whose times are kept, or span the raster, where the map says so.
     raster: Option<usize>,
-}
-
-/// Columns that share one time.
-#[derive(Debug)]
-struct Group {
-    /// Channels to be read: of a format without a time of its own its time first.
-    wanted: Vec<usize>,
-    /// How readings of that time become seconds: factor, offset, whether it is kept as it is.
-    time: Option<(f64, f64, bool)>,
-    /// How late they report.
-    delay_s: f64,
-    /// Which of the columns they are.
-    members: Vec<usize>,
 }
 
 impl Stream {
@@ -188,7 +160,13 @@ impl Stream {
         let units = units.map_err(|problem| problem.in_file(file.path()))?;
         let mut tracks = Vec::with_capacity(self.groups.len());
         for group in &self.groups {
-            tracks.push(Track::new(self, file, group, &units, &group.wanted)?);
+            tracks.push(Track::new(
+                &self.prepared,
+                file,
+                group,
+                &units,
+                &group.wanted,
+            )?);
         }
         let mut out = Out {
             sink,
@@ -260,7 +238,7 @@ impl Stream {
             // Of the channels one, so that its times are given.
             let first = group.time.is_some().into();
             let wanted = group.wanted.get(..=first).unwrap_or_default();
-            seen.push(Track::new(self, file, group, units, wanted)?.seen()?);
+            seen.push(Track::new(&self.prepared, file, group, units, wanted)?.seen()?);
         }
         let rate = |group: &usize| seen[*group].steps.rate_hz();
         // The first of equals in the order of the columns, as where all is read at once.
@@ -450,274 +428,6 @@ impl Stream {
         let told = faults.into_iter().chain(gaps_in_words);
         notes.extend(told.map(|fault| format!("fault: {fault}")));
         (notes, made)
-    }
-}
-
-impl Group {
-    /// Whether its time is the contract's own column.
-    fn keeps(&self) -> bool {
-        matches!(self.time, Some((_, _, true)))
-    }
-}
-
-/// What the rows were written at.
-struct Raster {
-    /// The file's first sample: it becomes 0.
-    start_s: f64,
-    rate_hz: Option<f64>,
-    words: String,
-    /// Of each column.
-    done: Vec<Done>,
-}
-
-/// Where the raster's times come from.
-enum Grid {
-    /// The times of the chosen group.
-    Times,
-    /// A rate, from a time on.
-    Even {
-        first_s: f64,
-        rate_hz: f64,
-        next: usize,
-        rows: usize,
-    },
-}
-
-/// Some times of the raster, and the readings that the chosen group has there where its times are the raster's.
-struct Next {
-    times: Vec<f64>,
-    kept: Vec<Vec<f64>>,
-}
-
-impl Grid {
-    /// The next times within a span; `None` at the end.
-    fn next(&mut self, chosen: &mut Track<'_>, span_s: f64) -> Result<Option<Next>, StreamError> {
-        match self {
-            Self::Times => {
-                while chosen.times.is_empty() {
-                    if !chosen.next()? {
-                        return Ok(None);
-                    }
-                }
-                let first = chosen.times.first().copied().unwrap_or(0.0);
-                let rows = chosen.times.partition_point(|time| time - first <= span_s);
-                let rows = rows.clamp(1, MOST_ROWS.min(chosen.times.len()));
-                let times = chosen.times.drain(..rows).collect();
-                let columns = chosen.columns.iter_mut();
-                let kept = columns.map(|values| values.drain(..rows).collect());
-                Ok(Some(Next {
-                    times,
-                    kept: kept.collect(),
-                }))
-            }
-            Self::Even {
-                first_s,
-                rate_hz,
-                next,
-                rows,
-            } => {
-                let left = rows.saturating_sub(*next);
-                let count = ((span_s * *rate_hz) as usize).clamp(1, MOST_ROWS).min(left);
-                let from = *next;
-                *next += count;
-                let times = (from..*next).map(|k| *first_s + k as f64 / *rate_hz);
-                Ok((count > 0).then(|| Next {
-                    times: times.collect(),
-                    kept: Vec::new(),
-                }))
-            }
-        }
-    }
-}
-
-/// Where the rows go.
-struct Out<'a> {
-    sink: &'a mut dyn RowSink,
-    progress: &'a mut dyn FnMut(u64),
-    rows: u64,
-    /// Empty cells of each column.
-    empty: Vec<u64>,
-}
-
-impl Out<'_> {
-    fn rows(&mut self, columns: &[Vec<f64>]) -> Result<(), StreamError> {
-        let columns_of_channels = columns.iter().skip(1);
-        for (empty, values) in self.empty.iter_mut().zip(columns_of_channels) {
-            *empty += values.iter().filter(|value| value.is_nan()).count() as u64;
-        }
-        self.rows += columns.first().map_or(0, Vec::len) as u64;
-        self.sink.rows(columns)?;
-        (self.progress)(self.rows);
-        Ok(())
-    }
-}
-
-/// The readings of a group as they come.
-struct Track<'a> {
-    file: &'a SourceFile,
-    group: &'a Group,
-    pieces: FilePieces<'a>,
-    /// The channel that is named where its time is out of order.
-    timed: &'a Channel,
-    /// Of each member: factor and offset to SI, and the map's entry.
-    members: Vec<(f64, f64, &'a crate::map::Entry)>,
-    steps: Steps,
-    untimed: u64,
-    /// Readings of each member that are invalid in the file.
-    invalid: Vec<u64>,
-    ended: bool,
-    /// What was read and is needed still: times in s, and the members in SI units.
-    times: Vec<f64>,
-    columns: Vec<Vec<f64>>,
-}
-
-/// The times of a group, gone through.
-struct Seen {
-    steps: Steps,
-    /// Equal where all times are.
-    times_hash: u64,
-}
-
-impl<'a> Track<'a> {
-    /// A pass over some of the channels that a group wants: its time and the first ones.
-    fn new(
-        stream: &'a Stream,
-        file: &'a SourceFile,
-        group: &'a Group,
-        units: &[(f64, f64, String)],
-        wanted: &[usize],
-    ) -> Result<Self, StreamError> {
-        let fail = |reason: &str| Problem::whole(reason).in_file(file.path());
-        let pieces = file.pieces(wanted)?;
-        let pieces = pieces.ok_or_else(|| fail("cannot be read in pieces"))?;
-        let channels = &stream.prepared.channels;
-        let timed = wanted.first().and_then(|&at| channels.get(at));
-        let count = wanted.len() - usize::from(group.time.is_some());
-        let members = group.members.iter().take(count).map(|&place| {
-            let (factor, offset, _) = &units[place];
-            (
-                *factor,
-                *offset,
-                &stream.prepared.roles.assigned[place].entry,
-            )
-        });
-        Ok(Self {
-            file,
-            group,
-            pieces,
-            timed: timed.ok_or_else(|| fail("no channel"))?,
-            members: members.collect(),
-            steps: Steps::default(),
-            untimed: 0,
-            invalid: vec![0; count],
-            ended: false,
-            times: Vec::new(),
-            columns: vec![Vec::new(); count],
-        })
-    }
-
-    fn keeps(&self) -> bool {
-        self.group.keeps()
-    }
-
-    /// Appends the next piece to what is in memory; false at the end.
-    fn next(&mut self) -> Result<bool, StreamError> {
-        let Some(piece) = self.pieces.next() else {
-            self.ended = true;
-            return Ok(false);
-        };
-        let fail = |problem: Problem| problem.in_file(self.file.path());
-        let (times, series) = self.split(piece?).map_err(fail)?;
-        for &time in times.iter().filter(|time| time.is_finite()) {
-            if let Some((_, before)) = self.steps.ends
-                && time <= before
-            {
-                let problem = convert::out_of_order(self.timed, self.steps.count, before, time);
-                return Err(fail(problem).into());
-            }
-            self.steps.next(time);
-        }
-        let missing = times.iter().filter(|time| !time.is_finite()).count();
-        self.untimed += missing as u64;
-        let readings = series.into_iter().zip(&self.members);
-        let told = self.invalid.iter_mut().zip(&mut self.columns);
-        for ((series, &(factor, offset, entry)), (invalid, column)) in readings.zip(told) {
-            let Series {
-                mut values,
-                invalid: flags,
-                ..
-            } = series;
-            *invalid += convert::bring(&mut values, flags, entry, factor, offset);
-            if missing > 0 {
-                let mut timed = times.iter().map(|time| time.is_finite());
-                values.retain(|_| timed.next().unwrap_or(true));
-            }
-            if column.is_empty() {
-                *column = values;
-            } else {
-                column.extend(values);
-            }
-        }
-        self.times
-            .extend(times.into_iter().filter(|time| time.is_finite()));
-        Ok(true)
-    }
-
-    /// Times in s, and the series of the members.
-    fn split(&self, mut piece: Vec<Series>) -> Result<(Vec<f64>, Vec<Series>), Problem> {
-        let delay_s = self.group.delay_s;
-        let times: Vec<f64> = match self.group.time {
-            Some((factor, offset, _)) if !piece.is_empty() => {
-                let time = piece.remove(0).values.into_iter();
-                time.map(|value| factor * value + offset - delay_s)
-                    .collect()
-            }
-            _ => {
-                let times = piece.first().and_then(|series| series.time_s.as_deref());
-                let times = times.ok_or_else(|| Problem::whole("no time"))?;
-                times.iter().map(|time| time - delay_s).collect()
-            }
-        };
-        if let Some(other) = piece.iter().find(|one| one.values.len() != times.len()) {
-            return Err(Problem::whole(format!(
-                "{} readings and {} time stamps",
-                other.values.len(),
-                times.len()
-            )));
-        }
-        Ok((times, piece))
-    }
-
-    /// Goes through the times alone.
-    fn seen(mut self) -> Result<Seen, StreamError> {
-        let mut hasher = DefaultHasher::new();
-        while self.next()? {
-            for time in self.times.drain(..) {
-                time.to_bits().hash(&mut hasher);
-            }
-            self.columns.iter_mut().for_each(Vec::clear);
-        }
-        Ok(Seen {
-            steps: self.steps,
-            times_hash: hasher.finish(),
-        })
-    }
-
-    /// Leaves behind what lies before a time, but for the last reading there, and reads until there is one behind another time.
-    fn go_to(&mut self, from: f64, to: f64) -> Result<(), StreamError> {
-        loop {
-            let before = self.times.partition_point(|&time| time < from);
-            let left = before.saturating_sub(1);
-            self.times.drain(..left);
-            for values in &mut self.columns {
-                values.drain(..left);
-            }
-            let reaches = self.times.last().is_some_and(|&last| last > to);
-            if self.ended || reaches {
-                return Ok(());
-            }
-            self.next()?;
-        }
     }
 }
 
@@ -943,7 +653,7 @@ mod tests {
         let stream = Stream::of(&file, Some(&map)).unwrap().unwrap();
         let group = stream.groups.iter().find(|one| one.members == [2]).unwrap();
         let units = stream.prepared.units().unwrap();
-        let mut track = Track::new(&stream, &file, group, &units, &group.wanted).unwrap();
+        let mut track = Track::new(&stream.prepared, &file, group, &units, &group.wanted).unwrap();
         let mut most = 0;
         for k in 0..90 {
             let time = 0.3 + f64::from(k) * 0.1;
