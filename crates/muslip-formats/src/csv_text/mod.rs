@@ -17,7 +17,7 @@ use self::cell::{
 use self::layout::{HEAD_LINES, Layout};
 use self::lines::{Lines, Text, decoder, encoding_of, place};
 use self::plain::PlainRows;
-use crate::error::{Place, Problem};
+use crate::error::Problem;
 use crate::file_bytes::FileBytes;
 use crate::made::{COMMENT_BYTES, Made};
 use crate::source::{Channel, Kind, Pieces, Series, Source};
@@ -309,6 +309,7 @@ mod tests {
     use super::lines::{LONGEST_LINE, PIECE_BYTES};
     use super::plain::plain_number;
     use super::*;
+    use crate::error::Place;
     use std::io::Write as _;
 
     fn source(bytes: &[u8]) -> Result<CsvSource, Problem> {

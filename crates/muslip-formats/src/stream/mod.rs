@@ -5,7 +5,6 @@ mod grid;
 mod sink;
 mod track;
 
-use std::io;
 use std::mem::take;
 
 pub use self::sink::{RowSink, StreamError};
@@ -19,7 +18,6 @@ use crate::made::{Fault, Made};
 use crate::map::Map;
 use crate::raster::{Bringing, Done};
 use crate::roles::TIME;
-use crate::source::{Channel, Series};
 use crate::source_file::SourceFile;
 use crate::steps::Steps;
 
@@ -433,13 +431,14 @@ impl Stream {
 
 #[cfg(test)]
 mod tests {
+    use std::io;
     use std::path::PathBuf;
     use std::sync::Arc;
 
     use super::*;
     use crate::Format;
     use crate::convert::convert;
-    use crate::source::{Kind, Pieces, Source};
+    use crate::source::{Channel, Kind, Pieces, Series, Source};
 
     /// Groups of channels with times of their own, which give so many readings at a time.
     struct Bench {
