@@ -42,7 +42,7 @@ enum Command {
     Firmware,
     /// Processor in the loop: the image in QEMU, in lock-step with the rig simulator, against its budgets.
     Pil {
-        /// Simulated seconds of the endurance run.
+        /// Simulated seconds of the endurance run, and of the one at true pace
         #[arg(long, default_value_t = 10)]
         seconds: u32,
         /// Only scenarios whose name contains this; budgets are then of those alone.
