@@ -32,6 +32,11 @@ static SENDING: Most = Most::new();
 
 struct Line {
     uart: <This as Chip>::Uart,
+    ends: Ends,
+}
+
+/// The interrupt's ends of the buffers.
+struct Ends {
     received: Sender<u8>,
     transmit: Taker<u8>,
 }
@@ -127,8 +132,10 @@ pub fn start(uart: <This as Chip>::Uart) -> Option<LinkEnd> {
     let (transmit_in, transmit_out) = queue::split(transmit);
     let line = Line {
         uart,
-        received: received_in,
-        transmit: transmit_out,
+        ends: Ends {
+            received: received_in,
+            transmit: transmit_out,
+        },
     };
     #[allow(unsafe_code, reason = "what the interrupt owns")]
     // SAFETY: the board enables the interrupt after this.
@@ -142,7 +149,19 @@ pub fn start(uart: <This as Chip>::Uart) -> Option<LinkEnd> {
 }
 
 /// The interrupt of the UART; only that may call it.
+#[inline]
 pub fn interrupt() {
+    move_bytes(|line| (&mut line.uart, &mut line.ends));
+}
+
+/// The same where another UART stands in for the chip's.
+#[cfg(feature = "stm32f405")]
+pub fn interrupt_of(uart: &mut impl Uart) {
+    move_bytes(|line| (uart, &mut line.ends));
+}
+
+#[inline]
+fn move_bytes<'a, U: Uart + 'a>(of: impl FnOnce(&'a mut Line) -> (&'a mut U, &'a mut Ends)) {
     let start = cycles();
     #[allow(unsafe_code, reason = "what this interrupt owns")]
     // SAFETY: only this interrupt calls it.
@@ -150,7 +169,8 @@ pub fn interrupt() {
     let Some(line) = line else {
         return;
     };
-    let moved = (line.take(), line.send());
+    let (uart, ends) = of(line);
+    let moved = (ends.take(uart), ends.send(uart));
     // Nothing but the ends of the program goes before it.
     let took = cycles().wrapping_sub(start);
     keep(Interrupter::Link, took);
@@ -162,12 +182,12 @@ pub fn interrupt() {
     }
 }
 
-impl Line {
+impl Ends {
     /// Takes what was received: where the chip holds one, one byte. The loop is for one that holds more, and for the
     /// emulator, whose UART withdraws its interrupt with every byte that is read, whether another is there or not.
-    fn take(&mut self) -> u32 {
+    fn take(&mut self, uart: &mut impl Uart) -> u32 {
         let mut taken = 0;
-        while let Some((lost, byte)) = self.uart.take() {
+        while let Some((lost, byte)) = uart.take() {
             if lost {
                 add(&OVERRUN, 1);
             }
@@ -183,18 +203,18 @@ impl Line {
     }
 
     /// Sends what the UART takes.
-    fn send(&mut self) -> u32 {
+    fn send(&mut self, uart: &mut impl Uart) -> u32 {
         let mut sent = 0;
-        while self.uart.is_ready() {
+        while uart.is_ready() {
             let Some(byte) = self.transmit.pop() else {
                 break;
             };
-            self.uart.send(byte);
+            uart.send(byte);
             add(&SENT, 1);
             sent += 1;
         }
         let more = self.transmit.ready();
-        self.uart.ask(more);
+        uart.ask(more);
         sent
     }
 }

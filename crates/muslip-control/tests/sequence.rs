@@ -257,6 +257,11 @@ fn a_ramp_rises_to_full_pressure_and_is_over_half_as_long_again_after_it() {
     }
     // 0.75 s at two a second.
     assert_eq!(run.after(1, BRAKED), State::Release);
+    // One second at 1.5 a second, both of them exact.
+    let demand_per_s = 1.5;
+    let mut run = Run::ramping(&profile(Program::Ramp { demand_per_s }));
+    assert_eq!(run.after(999, BRAKED), State::Ramp);
+    assert_eq!(run.after(1, BRAKED), State::Release);
 }
 
 #[test]

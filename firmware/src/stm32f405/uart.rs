@@ -6,7 +6,7 @@ use muslip_record::LINK_BAUD;
 use stm32f4::stm32f405::{Interrupt, NVIC, RCC, USART1, USART2, interrupt};
 
 use super::settings::{APB1_HZ, APB2_HZ, HSI_HZ, LOG_BAUD};
-use super::wire;
+use super::wire::{self, Wire};
 use crate::bits::low_u8;
 use crate::chip::Uart;
 use crate::link::{self, LinkEnd};
@@ -92,9 +92,6 @@ pub struct Usart2(USART2);
 
 impl Uart for Usart2 {
     fn take(&mut self) -> Option<(bool, Option<u8>)> {
-        if wire::is_on() {
-            return wire::take();
-        }
         let status = self.0.sr().read().bits();
         if status & (RXNE | ORE) == 0 {
             return None;
@@ -105,16 +102,10 @@ impl Uart for Usart2 {
     }
 
     fn is_ready(&mut self) -> bool {
-        if wire::is_on() {
-            return wire::is_ready();
-        }
         self.0.sr().read().bits() & TXE != 0 && allowed()
     }
 
     fn send(&mut self, byte: u8) {
-        if wire::is_on() {
-            return wire::send(byte);
-        }
         // SAFETY: any byte may be sent.
         self.0.dr().write(|w| unsafe { w.bits(u16::from(byte)) });
         if PACED.load(Ordering::Relaxed) {
@@ -124,9 +115,6 @@ impl Uart for Usart2 {
     }
 
     fn ask(&mut self, more: bool) {
-        if wire::is_on() {
-            return wire::ask(more);
-        }
         let more = more && allowed();
         self.0.cr1().modify(|r, w| {
             let bits = r.bits();
@@ -139,5 +127,9 @@ impl Uart for Usart2 {
 
 #[interrupt]
 fn USART2() {
-    link::interrupt();
+    if wire::is_on() {
+        link::interrupt_of(&mut Wire);
+    } else {
+        link::interrupt();
+    }
 }

@@ -22,6 +22,7 @@ use super::uart;
 use crate::bits::{low_u8, low_u16};
 use crate::board::SAMPLING_PRIORITY;
 use crate::cell::InterruptCell;
+use crate::chip::Uart;
 use crate::counter::{Most, cycles};
 use crate::queue::{self, Sender, Taker};
 use crate::totals::{LATE, RAISED, WORKED, add};
@@ -202,32 +203,34 @@ fn tell_and_hear() {
     }
 }
 
-/// As [`crate::chip::Uart::take`].
-pub fn take() -> Option<(bool, Option<u8>)> {
-    let received = RECEIVED.swap(0, Ordering::Relaxed);
-    if received == 0 {
-        return None;
+/// The link's UART at the wire's pace.
+pub struct Wire;
+
+impl Uart for Wire {
+    fn take(&mut self) -> Option<(bool, Option<u8>)> {
+        let received = RECEIVED.swap(0, Ordering::Relaxed);
+        if received == 0 {
+            return None;
+        }
+        WAITED.take(cycles().wrapping_sub(CAME.load(Ordering::Relaxed)));
+        Some((
+            received & OVERRUN != 0,
+            (received & FULL != 0).then_some(low_u8(received)),
+        ))
     }
-    WAITED.take(cycles().wrapping_sub(CAME.load(Ordering::Relaxed)));
-    Some((
-        received & OVERRUN != 0,
-        (received & FULL != 0).then_some(low_u8(received)),
-    ))
-}
 
-/// As [`crate::chip::Uart::is_ready`].
-pub fn is_ready() -> bool {
-    SENDING.load(Ordering::Relaxed) == 0
-}
+    fn is_ready(&mut self) -> bool {
+        SENDING.load(Ordering::Relaxed) == 0
+    }
 
-/// As [`crate::chip::Uart::send`].
-pub fn send(byte: u8) {
-    SENDING.store(u16::from(byte) | FULL, Ordering::Relaxed);
-}
+    fn send(&mut self, byte: u8) {
+        SENDING.store(u16::from(byte) | FULL, Ordering::Relaxed);
+    }
 
-/// As [`crate::chip::Uart::ask`]: the next tick raises the interrupt.
-pub fn ask(more: bool) {
-    ASKS.store(more, Ordering::Relaxed);
+    /// The next tick raises the interrupt.
+    fn ask(&mut self, more: bool) {
+        ASKS.store(more, Ordering::Relaxed);
+    }
 }
 
 /// Waits as long as sampling waits for its buses.
