@@ -51,7 +51,7 @@ fn SysTick() {
 pub(crate) fn sample() {
     let watch = Stopwatch::start();
     #[allow(unsafe_code, reason = "what the sampling interrupt owns")]
-    // SAFETY: only this interrupt calls it.
+    // SAFETY: only the interrupt that samples calls it, which is one from start to end of a sample.
     let sampler = unsafe { SAMPLER.get() };
     let Some(sampler) = sampler else {
         return;

@@ -11,6 +11,7 @@ mod fuzz;
 mod image;
 mod latency;
 mod mechanisms;
+mod mutants;
 mod python;
 mod pythons;
 mod release;
@@ -64,6 +65,8 @@ enum Command {
         #[arg(long, default_value_t = 1)]
         seed: u64,
     },
+    /// Change the controller's interlocks, sequence, ranges and store, one place at a time: whether its tests notice each.
+    Mutants,
     /// What one update of each filter costs on a Cortex-M4F: instructions in QEMU, modelled cycles.
     Cycles {
         /// Print a JSON list and nothing else.
@@ -197,6 +200,7 @@ fn main() -> anyhow::Result<()> {
                 None => firmware::pil(&arguments, write),
             }
         }
+        Command::Mutants => mutants::run_all(),
         Command::Fuzz { cases, seed } => fuzz::run_all(cases, seed),
         Command::Cycles { check: true, .. } => cycles::check(),
         Command::Cycles { json, write, .. } => cycles::run_all(json, write),

@@ -18,6 +18,8 @@ pub const TARGETS: [&str; 3] = [
 
 /// The version of cargo-deny that `deny.toml` is written for.
 const CARGO_DENY: &str = "0.20.2";
+/// The version of cargo-mutants that `.cargo/mutants.toml` is written for.
+const CARGO_MUTANTS: &str = "27.1.0";
 
 /// A program from a system package.
 struct Tool {
@@ -157,18 +159,24 @@ pub fn run_all() -> Result<()> {
     Machine::this().set_up(TOOLS)
 }
 
-/// The program cargo-deny, built below the target folder where it is not there yet: takes some minutes.
+/// The program cargo-deny.
 pub fn cargo_deny() -> Result<PathBuf> {
-    let folder = target()
-        .join("tools")
-        .join(format!("cargo-deny-{CARGO_DENY}"));
-    let program = folder.join(format!("bin/cargo-deny{}", std::env::consts::EXE_SUFFIX));
+    built("cargo-deny", CARGO_DENY)
+}
+
+/// The program cargo-mutants.
+pub fn cargo_mutants() -> Result<PathBuf> {
+    built("cargo-mutants", CARGO_MUTANTS)
+}
+
+/// A program of cargo's, built below the target folder where it is not there yet: takes some minutes.
+fn built(name: &str, version: &str) -> Result<PathBuf> {
+    let folder = target().join("tools").join(format!("{name}-{version}"));
+    let program = folder.join(format!("bin/{name}{}", std::env::consts::EXE_SUFFIX));
     if !program.exists() {
         let mut install = cargo(&["install", "--locked", "--quiet", "--root"]);
-        install
-            .arg(&folder)
-            .args(["--version", CARGO_DENY, "cargo-deny"]);
-        set_up_step(&format!("build cargo-deny {CARGO_DENY}"), install)?;
+        install.arg(&folder).args(["--version", version, name]);
+        set_up_step(&format!("build {name} {version}"), install)?;
     }
     Ok(program)
 }
