@@ -284,6 +284,41 @@ fn a_slot_begun_in_the_other_sector_is_noticed_as_well() {
 }
 
 #[test]
+fn a_slot_begun_after_the_newest_is_noticed_in_either_sector_however_far_behind() {
+    for (saves, torn) in [(3, 3), (3, 7), (9, 9), (9, 15)] {
+        let mut flash = saved(saves);
+        flash.bytes[torn * SLOT_BYTES + 40] = 0;
+        assert_eq!(
+            everything_loaded(&flash),
+            before_the_newest(saves),
+            "{saves} {torn}"
+        );
+    }
+}
+
+#[test]
+fn an_erase_that_was_cut_is_noticed_whatever_it_left() {
+    // The first sector full for the second time, the other with eight saves of before.
+    let full = saved(24);
+    assert_eq!(everything_loaded(&full), Some(newest(24)));
+    let cut = |change: fn(&mut [u8])| {
+        let mut flash = full.clone();
+        change(&mut flash.bytes[SECTOR..]);
+        everything_loaded(&flash)
+    };
+    // Everything half erased.
+    assert_eq!(cut(|sector| sector.fill(0x5A)), before_the_newest(24));
+    // Its end erased, a slot half erased, its beginning whole.
+    let end = |sector: &mut [u8]| {
+        sector[3 * SLOT_BYTES..4 * SLOT_BYTES].fill(0x5A);
+        sector[4 * SLOT_BYTES..].fill(0xFF);
+    };
+    assert_eq!(cut(end), before_the_newest(24));
+    // Full of whole slots and one that was torn when the sector was in use: no news.
+    assert_eq!(cut(|sector| sector[40 + SLOT_BYTES] ^= 1), Some(newest(24)));
+}
+
+#[test]
 fn a_slot_that_was_torn_long_ago_in_the_other_sector_is_no_news() {
     // Torn and saved again, in a sector that is then filled and left.
     let mut flash = saved(2);
