@@ -194,7 +194,8 @@ impl<F: NorFlash> Store<F> {
         let mut sector = newest
             .as_ref()
             .map_or(0, |newest| newest.address / Self::sector_bytes());
-        let mut from = sector * Self::sector_bytes();
+        // What lies before the slot that was refused last is not tried again.
+        let mut from = 0;
         let mut refused = StoreError::NotWritten;
         for _ in 0..SLOTS_TRIED {
             let address = match self.blank_slot(sector, from)? {
