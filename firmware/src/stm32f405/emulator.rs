@@ -304,6 +304,7 @@ fn obey(message: &ToFirmware) {
         ToFirmware::Pace { raw, .. } => {
             put(raw, 0);
             totals::reset();
+            uart::silence();
             wire::start();
         }
         ToFirmware::HardFault => cortex_m::asm::udf(),

@@ -19,6 +19,8 @@ mod clock;
 #[cfg(target_os = "none")]
 mod emulator;
 #[cfg(target_os = "none")]
+mod pace;
+#[cfg(target_os = "none")]
 mod start;
 #[cfg(target_os = "none")]
 #[allow(unsafe_code, reason = "raw register values")]

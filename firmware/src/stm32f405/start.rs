@@ -10,7 +10,7 @@ use stm32f4::stm32f405::{Interrupt, Peripherals};
 use super::any::{AnyActuators, AnyBoard, AnySensors};
 use super::chip::Stm32f405;
 use super::settings::{CORE_HZ, CYCLES_PER_SAMPLE, HSI_HZ, RATES};
-use super::{chip, emulator, table, uart, wire};
+use super::{chip, emulator, pace, table, uart, wire};
 use crate::board::{Started, origin, set_priorities, start_timer};
 use crate::chip::{Chip, Took};
 use crate::fault;
@@ -141,7 +141,7 @@ impl Chip for Stm32f405 {
 
     #[inline]
     fn timer_is_taken() -> bool {
-        wire::tick()
+        pace::tick()
     }
 
     fn sampled() {

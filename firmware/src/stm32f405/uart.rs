@@ -17,8 +17,7 @@ pub const RXNE: u16 = 1 << 5;
 const TXE: u16 = 1 << 7;
 const ORE: u16 = 1 << 3;
 const UE: u16 = 1 << 13;
-/// Transmit interrupt enable.
-pub const TXEIE: u16 = 1 << 7;
+const TXEIE: u16 = 1 << 7;
 /// Receive interrupt enable.
 pub const RXNEIE: u16 = 1 << 5;
 const TE: u16 = 1 << 3;
@@ -70,6 +69,17 @@ pub fn start(rcc: &RCC, log: &USART1, link: USART2, full_clock: bool) -> Option<
     // SAFETY: nothing relies on this interrupt being masked.
     unsafe { NVIC::unmask(Interrupt::USART2) };
     Some(end)
+}
+
+/// No interrupt comes of the link's UART itself any more, in the emulator: another stands in for it.
+pub fn silence() {
+    // SAFETY: two bits change, to a value that they may have; the link's interrupt is not in the midst of it, for what
+    // calls this goes after it.
+    unsafe {
+        (*USART2::ptr())
+            .cr1()
+            .modify(|r, w| w.bits(r.bits() & !(RXNEIE | TXEIE)));
+    }
 }
 
 /// Sends a byte of the log where the UART takes one; whether it did.

@@ -1,35 +1,28 @@
 //! The emulator's link at the pace of its wire: bytes come and go one at a time, whether the program is ready or not.
 //!
-//! QEMU's UART takes no time. Here the core's timer ticks once a byte, above every interrupt of the program; a tick brings the next
-//! byte, takes the one that is sent, and raises the link's interrupt as silicon would. Sampling is `PendSV`'s meanwhile, on the
-//! same priority as ever, and takes as long as its buses do. Each time that a sample is due the timer stands still while
-//! the simulator is told of the last and says the next: nothing of the program runs then, so none of its time passes.
+//! QEMU's UART takes no time. Here the core's timer ticks once a byte, above every interrupt of the program
+//! (`pace.rs`); a tick brings the next byte, takes the one that is sent, and raises the link's interrupt as silicon would.
 
 use core::sync::atomic::{AtomicBool, AtomicU16, AtomicU32, Ordering};
 
 use cortex_m::peripheral::scb::SystemHandler;
 use cortex_m::peripheral::syst::SystClkSource;
-use cortex_m::peripheral::{SCB, SYST};
-use cortex_m_rt::exception;
 use heapless::spsc::Queue;
-use muslip_control::emulation::{FromFirmware, NS_PER_INSTRUCTION_LOG2};
+use muslip_control::emulation::NS_PER_INSTRUCTION_LOG2;
 use muslip_record::LINK_BAUD;
-use stm32f4::stm32f405::{Interrupt, NVIC, TIM2, USART2, USART3};
+use stm32f4::stm32f405::{Interrupt, NVIC, TIM2, USART2};
 
-use super::emulator;
-use super::settings::{CORE_HZ, CYCLES_PER_SAMPLE};
-use super::uart;
+use super::settings::CORE_HZ;
 use crate::bits::{low_u8, low_u16};
 use crate::board::SAMPLING_PRIORITY;
 use crate::cell::InterruptCell;
 use crate::chip::Uart;
 use crate::counter::{Most, cycles};
 use crate::queue::{self, Sender, Taker};
-use crate::totals::{LATE, RAISED, WORKED, add};
-use crate::{link, run};
+use crate::totals::add;
 
 /// Core cycles of a byte's ten bits.
-const CYCLES_PER_BYTE: u32 = CORE_HZ / (LINK_BAUD / 10);
+pub const CYCLES_PER_BYTE: u32 = CORE_HZ / (LINK_BAUD / 10);
 /// Time in which sampling waits for its buses at the worst: the table of *Interrupts* in docs/rig.md without the
 /// instructions.
 const BUSES_NS: u32 = 34_000;
@@ -49,8 +42,6 @@ static RECEIVED: AtomicU16 = AtomicU16::new(0);
 static SENDING: AtomicU16 = AtomicU16::new(0);
 /// Whether the link asks for an interrupt when it may send.
 static ASKS: AtomicBool = AtomicBool::new(false);
-/// Cycles since a sample was due.
-static SINCE_SAMPLE: AtomicU32 = AtomicU32::new(0);
 /// When the byte in the data register came, and the longest that one waited there, in cycles.
 static CAME: AtomicU32 = AtomicU32::new(0);
 static WAITED: Most = Most::new();
@@ -85,10 +76,6 @@ pub fn start() {
         // What the simulator says is taken while time stands still.
         NVIC::mask(Interrupt::USART3);
         (*TIM2::ptr()).psc().write(|w| w.bits(CYCLE_PRESCALER));
-        // No interrupt of the UART itself.
-        (*USART2::ptr())
-            .cr1()
-            .modify(|r, w| w.bits(r.bits() & !(uart::RXNEIE | uart::TXEIE)));
     }
     ON.store(true, Ordering::Relaxed);
     // SAFETY: in the emulator nobody else uses the timer, and nothing relies on another order.
@@ -106,45 +93,12 @@ pub fn start() {
     core.SYST.enable_counter();
 }
 
-/// A byte's time has passed; false where the timer is not the wire's.
-pub fn tick() -> bool {
-    if !is_on() {
-        return false;
-    }
-    move_bytes();
-    let since = SINCE_SAMPLE.load(Ordering::Relaxed) + CYCLES_PER_BYTE;
-    if since < CYCLES_PER_SAMPLE {
-        SINCE_SAMPLE.store(since, Ordering::Relaxed);
-        return true;
-    }
-    SINCE_SAMPLE.store(since - CYCLES_PER_SAMPLE, Ordering::Relaxed);
-    #[allow(unsafe_code, reason = "raw register values")]
-    // SAFETY: ENABLE of the timer whose handler this is; its count stays.
-    let timer = unsafe { &(*SYST::PTR).csr };
-    #[allow(unsafe_code, reason = "raw register values")]
-    // SAFETY: as above.
-    unsafe {
-        timer.modify(|csr| csr & !1);
-    }
-    let stopped = cycles();
-    tell_and_hear();
-    // None of it passed for a byte that came with this tick.
-    add(&CAME, cycles().wrapping_sub(stopped));
-    #[allow(unsafe_code, reason = "raw register values")]
-    // SAFETY: as above.
-    unsafe {
-        timer.modify(|csr| csr | 1);
-    }
-    SCB::set_pendsv();
-    true
-}
-
 /// What the wire does in a byte's time.
 #[allow(
     unsafe_code,
     reason = "raw register values, and what this interrupt owns"
 )]
-fn move_bytes() {
+pub fn move_bytes() {
     let sent = SENDING.swap(0, Ordering::Relaxed);
     if sent & FULL != 0 {
         // SAFETY: any byte may be sent; QEMU's UART is always ready.
@@ -166,41 +120,33 @@ fn move_bytes() {
     }
 }
 
-/// Tells the simulator of the sample before, and takes the next with the bytes that the wire brings during it.
-#[allow(
-    unsafe_code,
-    reason = "raw register values, and what this interrupt owns"
-)]
-fn tell_and_hear() {
-    let [raised, worked, late] =
-        [&RAISED, &WORKED, &LATE].map(|total| total.load(Ordering::Relaxed));
-    // SAFETY: this interrupt's alone.
-    let Some(waiting) = (unsafe { WAITING.get() }) else {
-        return;
-    };
-    let ready = low_u16((WAITING_BYTES - 1 - waiting.to.room()) as u32);
-    emulator::say(&FromFirmware::Paced {
-        raised,
-        worked,
-        late,
-        output: emulator::output(),
-        link_sent: link::totals().1,
-        waited: WAITED.get(),
-        ready,
-        lost: link::overrun_bytes(),
-    });
-    // SAFETY: both are read here only, now that USART3's interrupt is masked.
-    let (uart, rig) = unsafe { (&*USART2::ptr(), &*USART3::ptr()) };
-    let mut wanted = emulator::heard_sample(|| {
-        while rig.sr().read().bits() & uart::RXNE == 0 {}
-        low_u8(rig.dr().read().bits())
-    });
-    while wanted > 0 {
-        if uart.sr().read().bits() & uart::RXNE != 0 {
-            waiting.to.push(low_u8(uart.dr().read().bits()));
-            wanted -= 1;
-        }
+/// Bytes that the wire has still to bring.
+#[allow(unsafe_code, reason = "what the tick owns")]
+pub fn ready() -> u16 {
+    // SAFETY: only the tick calls it.
+    let waiting = unsafe { WAITING.get() };
+    waiting.map_or(0, |waiting| {
+        low_u16((WAITING_BYTES - 1 - waiting.to.room()) as u32)
+    })
+}
+
+/// One more that it brings.
+#[allow(unsafe_code, reason = "what the tick owns")]
+pub fn bring(byte: u8) {
+    // SAFETY: only the tick calls it.
+    if let Some(waiting) = unsafe { WAITING.get() } {
+        waiting.to.push(byte);
     }
+}
+
+/// So many cycles passed while time stood still.
+pub fn stood_still(cycles: u32) {
+    add(&CAME, cycles);
+}
+
+/// The longest that a received byte waited to be taken, in cycles.
+pub fn waited() -> u32 {
+    WAITED.get()
 }
 
 /// The link's UART at the wire's pace.
@@ -236,10 +182,4 @@ impl Uart for Wire {
 /// Waits as long as sampling waits for its buses.
 pub fn wait_for_buses() {
     cortex_m::asm::delay(BUSES_NS >> NS_PER_INSTRUCTION_LOG2);
-}
-
-/// Samples while the timer is the wire's.
-#[exception]
-fn PendSV() {
-    run::sample();
 }
