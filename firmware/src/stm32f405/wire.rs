@@ -13,7 +13,7 @@ use muslip_record::LINK_BAUD;
 use stm32f4::stm32f405::{Interrupt, NVIC, TIM2, USART2};
 
 use super::settings::CORE_HZ;
-use crate::bits::{low_u8, low_u16};
+use crate::bits::low_u8;
 use crate::board::SAMPLING_PRIORITY;
 use crate::cell::InterruptCell;
 use crate::chip::Uart;
@@ -126,7 +126,7 @@ pub fn ready() -> u16 {
     // SAFETY: only the tick calls it.
     let waiting = unsafe { WAITING.get() };
     waiting.map_or(0, |waiting| {
-        low_u16((WAITING_BYTES - 1 - waiting.to.room()) as u32)
+        u16::try_from(WAITING_BYTES - 1 - waiting.to.room()).unwrap_or(u16::MAX)
     })
 }
 
