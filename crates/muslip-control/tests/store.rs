@@ -318,6 +318,71 @@ fn an_erase_that_was_cut_is_noticed_whatever_it_left() {
     assert_eq!(cut(|sector| sector[40 + SLOT_BYTES] ^= 1), Some(newest(24)));
 }
 
+/// A flash of which one slot reads as blank and refuses every word.
+struct Refusing {
+    flash: Flash,
+    slot: usize,
+}
+
+impl ErrorType for Refusing {
+    type Error = PowerCut;
+}
+
+impl ReadNorFlash for Refusing {
+    const READ_SIZE: usize = 1;
+    fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), PowerCut> {
+        self.flash.read(offset, bytes)
+    }
+    fn capacity(&self) -> usize {
+        self.flash.capacity()
+    }
+}
+
+impl NorFlash for Refusing {
+    const WRITE_SIZE: usize = Flash::<4>::WRITE_SIZE;
+    const ERASE_SIZE: usize = SECTOR;
+
+    fn erase(&mut self, from: u32, to: u32) -> Result<(), PowerCut> {
+        self.flash.erase(from, to)
+    }
+    fn write(&mut self, offset: u32, bytes: &[u8]) -> Result<(), PowerCut> {
+        if offset as usize / SLOT_BYTES == self.slot {
+            return Err(PowerCut);
+        }
+        self.flash.write(offset, bytes)
+    }
+}
+
+#[test]
+fn a_slot_that_refuses_is_passed_over_and_no_other_is_lost() {
+    for saves in 0..16 {
+        let slot = usize::from(saves);
+        let mut store = Store::new(Refusing {
+            flash: saved(saves),
+            slot,
+        });
+        assert_eq!(store.save(&numbered(99)), Ok(()), "{saves}");
+        assert_eq!(store.load(), Ok(Some(newest(99))), "{saves}");
+        let (before, after) = (saved(saves), store.into_inner().flash);
+        // The one that refuses is followed by its neighbour, or, last of its sector, by the first of the other.
+        let taken = if slot % 8 == 7 {
+            8 - slot / 8 * 8
+        } else {
+            slot + 1
+        };
+        let kept = (0..16).filter(|&place| place != taken && (slot != 15 || place >= 8));
+        for place in kept {
+            let bytes = place * SLOT_BYTES..(place + 1) * SLOT_BYTES;
+            assert_eq!(
+                before.bytes[bytes.clone()],
+                after.bytes[bytes],
+                "{saves} {place}"
+            );
+        }
+        assert_ne!(after.bytes[taken * SLOT_BYTES..][..4], [0xFF; 4], "{saves}");
+    }
+}
+
 #[test]
 fn a_slot_that_was_torn_long_ago_in_the_other_sector_is_no_news() {
     // Torn and saved again, in a sector that is then filled and left.
