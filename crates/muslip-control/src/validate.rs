@@ -242,6 +242,168 @@ mod tests {
     }
 
     #[test]
+    fn every_other_range_holds_at_its_end_and_not_beyond() {
+        type Change = fn(&mut Parameters);
+        let ends: [(u8, Change, Change); 15] = [
+            (
+                3,
+                |p| p.wheel_encoder.pulses_per_revolution = 1,
+                |p| p.wheel_encoder.pulses_per_revolution = 0,
+            ),
+            (
+                3,
+                |p| p.wheel_encoder.pulses_per_revolution = 10_000,
+                |p| p.wheel_encoder.pulses_per_revolution = 10_001,
+            ),
+            (
+                5,
+                |p| p.vehicle_encoder.pulses_per_revolution = 1,
+                |p| p.vehicle_encoder.pulses_per_revolution = 0,
+            ),
+            (
+                5,
+                |p| p.vehicle_encoder.pulses_per_revolution = 10_000,
+                |p| p.vehicle_encoder.pulses_per_revolution = 10_001,
+            ),
+            (
+                9,
+                |p| p.drag.zero_code = (1 << 23) - 1,
+                |p| p.drag.zero_code = 1 << 23,
+            ),
+            (
+                9,
+                |p| p.drag.zero_code = 1 - (1 << 23),
+                |p| p.drag.zero_code = -(1 << 23),
+            ),
+            (
+                11,
+                |p| p.normal.zero_code = (1 << 23) - 1,
+                |p| p.normal.zero_code = 1 << 23,
+            ),
+            (
+                12,
+                |p| p.brake.duty_at_zero = 0.0,
+                |p| p.brake.duty_at_zero = -f32::MIN_POSITIVE,
+            ),
+            (
+                13,
+                |p| p.brake.duty_at_full = p.brake.duty_at_zero.next_up(),
+                |p| p.brake.duty_at_full = p.brake.duty_at_zero,
+            ),
+            (
+                13,
+                |p| p.brake.duty_at_full = 1.0,
+                |p| p.brake.duty_at_full = 1.0_f32.next_up(),
+            ),
+            (
+                18,
+                |p| p.limits.minimum_normal_force_n = p.limits.maximum_force_n.next_down(),
+                |p| p.limits.minimum_normal_force_n = p.limits.maximum_force_n,
+            ),
+            (
+                23,
+                |p| p.estimator.skid_slip_minimum = 0.0,
+                |p| p.estimator.skid_slip_minimum = -f32::MIN_POSITIVE,
+            ),
+            (
+                24,
+                |p| p.estimator.skid_slip_maximum = p.estimator.skid_slip_minimum.next_up(),
+                |p| p.estimator.skid_slip_maximum = p.estimator.skid_slip_minimum,
+            ),
+            (
+                24,
+                |p| p.estimator.skid_slip_maximum = 1.05,
+                |p| p.estimator.skid_slip_maximum = 1.05_f32.next_up(),
+            ),
+            (
+                31,
+                |p| (p.pressure.volt_at_zero, p.pressure.volt_at_full) = (0.5, 1.0),
+                |p| (p.pressure.volt_at_zero, p.pressure.volt_at_full) = (0.5, 1.0_f32.next_down()),
+            ),
+        ];
+        for (row, (field, end, beyond)) in ends.into_iter().enumerate() {
+            let changed = |change: Change| {
+                let mut changed = Parameters::default();
+                change(&mut changed);
+                parameters(&changed)
+            };
+            assert_eq!(changed(end), Ok(()), "row {row}");
+            assert_eq!(changed(beyond), Err(field), "row {row}");
+        }
+    }
+
+    #[test]
+    fn every_range_of_a_profile_holds_at_its_ends_and_not_beyond() {
+        let good = Profile {
+            program: Program::Ramp { demand_per_s: 0.5 },
+            start_speed_m_s: 20.0,
+            skid_slip: 0.5,
+            skid_hold_s: 0.05,
+            applications: 1,
+            cool_s: 1.0,
+        };
+        let ramp = |demand_per_s| Program::Ramp { demand_per_s };
+        let steps = |level: f32, count, hold_s| Program::Steps {
+            levels: [level; muslip_record::STEPS],
+            count,
+            hold_s,
+        };
+        let held = |target_slip, hold_s| Program::SlipHold {
+            target_slip,
+            hold_s,
+        };
+        let (up, down) = (f32::next_up, f32::next_down);
+        for (end, beyond) in [
+            (ramp(f32::MIN_POSITIVE), ramp(0.0)),
+            (ramp(10.0), ramp(up(10.0))),
+            (steps(0.0, 1, 1.0), steps(0.0, 0, 1.0)),
+            (steps(0.0, 8, 1.0), steps(-f32::MIN_POSITIVE, 8, 1.0)),
+            (steps(1.0, 8, 1.0), steps(up(1.0), 8, 1.0)),
+            (steps(0.5, 8, 0.01), steps(0.5, 8, down(0.01))),
+            (steps(0.5, 8, 60.0), steps(0.5, 8, up(60.0))),
+            (held(0.01, 1.0), held(down(0.01), 1.0)),
+            (held(0.5, 1.0), held(up(0.5), 1.0)),
+            (held(0.1, 0.01), held(0.1, down(0.01))),
+            (held(0.1, 60.0), held(0.1, up(60.0))),
+        ] {
+            let with = |program| profile(&Profile { program, ..good });
+            assert!(with(end), "{end:?}");
+            assert!(!with(beyond), "{beyond:?}");
+        }
+        type Change = fn(&mut Profile, f32);
+        let changes: [(Change, f32, f32); 8] = [
+            (
+                |p, v| p.start_speed_m_s = v,
+                up(LOCK_SPEED_M_S),
+                LOCK_SPEED_M_S,
+            ),
+            (|p, v| p.start_speed_m_s = v, f32::MAX, f32::INFINITY),
+            (|p, v| p.skid_slip = v, 0.05, down(0.05)),
+            (|p, v| p.skid_slip = v, 1.0, up(1.0)),
+            (|p, v| p.skid_hold_s = v, 0.0, -f32::MIN_POSITIVE),
+            (|p, v| p.skid_hold_s = v, 0.15, up(0.15)),
+            (|p, v| p.cool_s = v, 0.1, down(0.1)),
+            (|p, v| p.cool_s = v, 600.0, up(600.0)),
+        ];
+        for (row, (change, end, beyond)) in changes.into_iter().enumerate() {
+            let with = |value| {
+                let mut changed = good;
+                change(&mut changed, value);
+                profile(&changed)
+            };
+            assert!(with(end), "row {row}");
+            assert!(!with(beyond), "row {row}");
+        }
+        for (applications, allowed) in [(0, false), (1, true), (100, true), (101, false)] {
+            let changed = Profile {
+                applications,
+                ..good
+            };
+            assert_eq!(profile(&changed), allowed, "{applications}");
+        }
+    }
+
+    #[test]
     fn profiles_outside_their_ranges_are_refused() {
         let good = Profile {
             program: Program::Ramp { demand_per_s: 0.5 },
