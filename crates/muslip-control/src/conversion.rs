@@ -122,6 +122,11 @@ mod tests {
         assert_eq!(sample.normal_force_n, 4120.0);
         conversion.set_zero_codes(3_500, 0);
         assert_eq!(conversion.convert(&raw).sample.drag_force_n, 0.0);
+        parameters.normal.newton_per_code = 2.0;
+        conversion.take(&parameters);
+        let sample = conversion.convert(&raw).sample;
+        assert_eq!(sample.drag_force_n, -1000.0);
+        assert_eq!(sample.normal_force_n, 16_480.0);
     }
 
     #[test]

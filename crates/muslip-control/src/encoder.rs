@@ -259,6 +259,26 @@ mod tests {
     }
 
     #[test]
+    fn parameters_taken_between_two_pulses_scale_the_speed_at_once() {
+        for (pulses_per_revolution, reversed, scale) in
+            [(500, false, 1.0), (250, false, 2.0), (250, true, -2.0)]
+        {
+            // A pulse every twelfth sample or so.
+            let (mut encoder, mut meter) = Encoder::new(500);
+            while !meter.update(&encoder.sample(1.0)).pulsed || encoder.now_s < 1.0 {}
+            meter.take(&EncoderParameters {
+                pulses_per_revolution,
+                reversed,
+            });
+            let speed = meter.update(&encoder.sample(1.0));
+            assert!(!speed.pulsed);
+            for rad_s in [speed.rad_s, speed.at_last_pulse_rad_s] {
+                assert!((rad_s - scale).abs() < 1e-3, "{rad_s} {scale}");
+            }
+        }
+    }
+
+    #[test]
     fn speed_is_as_fine_at_low_speed_as_at_high_speed_and_across_both_wraps() {
         for pulses_per_revolution in [48, 500, 4096] {
             for rad_s in [1.0, 3.3, 65.0, 140.0] {

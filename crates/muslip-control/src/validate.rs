@@ -242,6 +242,13 @@ mod tests {
     }
 
     #[test]
+    fn an_effect_that_cannot_be_compensated_has_a_number_behind_all_others() {
+        let mut bad = Parameters::default();
+        bad.compensation.force_delay_s = Some(-1.0);
+        assert_eq!(parameters(&bad), Err(34));
+    }
+
+    #[test]
     fn every_other_range_holds_at_its_end_and_not_beyond() {
         type Change = fn(&mut Parameters);
         let ends: [(u8, Change, Change); 15] = [
