@@ -106,6 +106,15 @@ mod tests {
         changed
     }
 
+    const GOOD: Profile = Profile {
+        program: Program::Ramp { demand_per_s: 0.5 },
+        start_speed_m_s: 20.0,
+        skid_slip: 0.5,
+        skid_hold_s: 0.05,
+        applications: 1,
+        cool_s: 1.0,
+    };
+
     /// Nothing beyond either end of a range is taken.
     fn refused_beyond(ranges: &[(u8, ceiling::Ceiling, Set)]) {
         for &(field, range, set) in ranges {
@@ -341,14 +350,6 @@ mod tests {
 
     #[test]
     fn every_range_of_a_profile_holds_at_its_ends_and_not_beyond() {
-        let good = Profile {
-            program: Program::Ramp { demand_per_s: 0.5 },
-            start_speed_m_s: 20.0,
-            skid_slip: 0.5,
-            skid_hold_s: 0.05,
-            applications: 1,
-            cool_s: 1.0,
-        };
         let ramp = |demand_per_s| Program::Ramp { demand_per_s };
         let steps = |level: f32, count, hold_s| Program::Steps {
             levels: [level; muslip_record::STEPS],
@@ -373,7 +374,7 @@ mod tests {
             (held(0.1, 0.01), held(0.1, down(0.01))),
             (held(0.1, 60.0), held(0.1, up(60.0))),
         ] {
-            let with = |program| profile(&Profile { program, ..good });
+            let with = |program| profile(&Profile { program, ..GOOD });
             assert!(with(end), "{end:?}");
             assert!(!with(beyond), "{beyond:?}");
         }
@@ -394,7 +395,7 @@ mod tests {
         ];
         for (row, (change, end, beyond)) in changes.into_iter().enumerate() {
             let with = |value| {
-                let mut changed = good;
+                let mut changed = GOOD;
                 change(&mut changed, value);
                 profile(&changed)
             };
@@ -404,7 +405,7 @@ mod tests {
         for (applications, allowed) in [(0, false), (1, true), (100, true), (101, false)] {
             let changed = Profile {
                 applications,
-                ..good
+                ..GOOD
             };
             assert_eq!(profile(&changed), allowed, "{applications}");
         }
@@ -412,32 +413,24 @@ mod tests {
 
     #[test]
     fn profiles_outside_their_ranges_are_refused() {
-        let good = Profile {
-            program: Program::Ramp { demand_per_s: 0.5 },
-            start_speed_m_s: 20.0,
-            skid_slip: 0.5,
-            skid_hold_s: 0.05,
-            applications: 1,
-            cool_s: 1.0,
-        };
-        assert!(profile(&good));
+        assert!(profile(&GOOD));
         assert!(!profile(&Profile {
             start_speed_m_s: 5.0,
-            ..good
+            ..GOOD
         }));
         assert!(!profile(&Profile {
             skid_hold_s: 0.2,
-            ..good
+            ..GOOD
         }));
         assert!(!profile(&Profile {
             skid_slip: f32::NAN,
-            ..good
+            ..GOOD
         }));
         assert!(!profile(&Profile {
             applications: 0,
-            ..good
+            ..GOOD
         }));
-        let with = |program| profile(&Profile { program, ..good });
+        let with = |program| profile(&Profile { program, ..GOOD });
         assert!(!with(Program::Ramp { demand_per_s: 0.0 }));
         let levels = [0.5; muslip_record::STEPS];
         assert!(with(Program::Steps {

@@ -12,7 +12,7 @@ use muslip_record::{
     SAMPLE_RATE_HZ, State, Telemetry,
 };
 
-use crate::host::Host;
+use crate::host::{Host, until};
 use crate::native::Native;
 use crate::qemu::Qemu;
 use crate::rig::Rig;
@@ -281,10 +281,7 @@ impl Bench {
 
     /// State of the newest sample that the host has.
     pub fn state(&self) -> State {
-        self.host
-            .heard
-            .sample
-            .map_or(State::Idle, |sample| sample.state)
+        self.host.heard.state()
     }
 
     /// Runs until a state is reached, or so many samples have passed.
@@ -292,16 +289,12 @@ impl Bench {
     /// # Errors
     /// As [`Bench::sample`], or the state is not reached.
     pub fn until(&mut self, state: State, samples: u32) -> Result<()> {
-        for _ in 0..samples {
-            if self.state() == state {
-                return Ok(());
-            }
-            self.sample()?;
-        }
-        bail!(
-            "{state:?} is not reached within {samples} samples, but {:?}; events {:?}",
-            self.state(),
-            self.host.heard.events
+        until(
+            self,
+            |bench| &bench.host.heard,
+            Self::sample,
+            state,
+            samples,
         )
     }
 }

@@ -1,9 +1,9 @@
 //! The host's end of the link, with a wire that may be bad.
 
-use anyhow::Result;
+use anyhow::{Result, bail};
 use muslip_record::{
     Answer, Command, Envelope, Estimate, Event, FRAME_BYTES, FrameError, FrameReader, Hello,
-    QuarterCar, Sample, Status, Telemetry, encode,
+    QuarterCar, Sample, State, Status, Telemetry, encode,
 };
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -60,6 +60,51 @@ pub struct Heard {
     pub bad_frames: u64,
     /// Numbers missing between frames.
     pub lost: u64,
+}
+
+impl Heard {
+    /// State of the newest sample.
+    pub fn state(&self) -> State {
+        self.sample.map_or(State::Idle, |sample| sample.state)
+    }
+
+    /// Skids so far.
+    pub fn skids(&self) -> usize {
+        let skids = |(_, event): &&(u32, Event)| {
+            matches!(
+                event,
+                Event::StateChanged {
+                    to: State::Skid,
+                    ..
+                }
+            )
+        };
+        self.events.iter().filter(skids).count()
+    }
+}
+
+/// Samples until the host hears of a state.
+///
+/// # Errors
+/// As a sample's, or it is not heard of within so many samples.
+pub fn until<S>(
+    of: &mut S,
+    heard: impl Fn(&S) -> &Heard,
+    sample: impl Fn(&mut S) -> Result<()>,
+    state: State,
+    samples: u32,
+) -> Result<()> {
+    for _ in 0..samples {
+        if heard(of).state() == state {
+            return Ok(());
+        }
+        sample(of)?;
+    }
+    bail!(
+        "{state:?} is not reached within {samples} samples, but {:?}; events {:?}",
+        heard(of).state(),
+        heard(of).events
+    )
 }
 
 impl Host {

@@ -130,7 +130,7 @@ pub(super) fn number(cell: &str, decimal_comma: bool) -> Option<f64> {
 }
 
 /// A number whose decimals stand behind a comma.
-pub(super) fn with_comma(cell: &str) -> Option<f64> {
+fn with_comma(cell: &str) -> Option<f64> {
     let Some((whole, rest)) = cell.split_once(',') else {
         // Without a comma a point parts thousands, or it is a whole number.
         return match cell.contains('.') {
@@ -159,7 +159,7 @@ pub(super) fn with_comma(cell: &str) -> Option<f64> {
 }
 
 /// Digits in threes parted by points, without the points.
-pub(super) fn thousands(whole: &str) -> Option<String> {
+fn thousands(whole: &str) -> Option<String> {
     let mut parts = whole.split('.');
     let first = parts.next()?;
     let mut digits = first.to_owned();

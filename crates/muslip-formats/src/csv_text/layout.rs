@@ -119,9 +119,7 @@ impl Layout {
 }
 
 /// The row of names and, where there is one, the row of units among the rows above the data.
-pub(super) fn header<'a>(
-    above: &[&'a (usize, Vec<String>)],
-) -> Option<(&'a [String], Option<&'a [String]>)> {
+fn header<'a>(above: &[&'a (usize, Vec<String>)]) -> Option<(&'a [String], Option<&'a [String]>)> {
     let (_, last) = above.last()?;
     if above.len() > 1 && units::is_unit_row(last) {
         let (_, names) = above.get(above.len() - 2)?;

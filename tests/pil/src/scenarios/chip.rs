@@ -5,11 +5,9 @@ use std::path::Path;
 use anyhow::{Context, Result, bail, ensure};
 use muslip_control::brake::BrakeOutput;
 use muslip_control::emulation::{FromFirmware, ToFirmware};
-use muslip_record::{
-    Command, End, Envelope, Event, FrameReader, PostMortem, Profile, State, Telemetry,
-};
+use muslip_record::{Command, End, Envelope, FrameReader, PostMortem, State, Telemetry};
 
-use super::{Found, LAW, RAMP, found};
+use super::{FOR_EVER, Found, LAW, RAMP, found};
 use crate::bench::{Bench, Worst};
 use crate::log;
 use crate::qemu::Qemu;
@@ -41,19 +39,12 @@ pub fn log(image: &Path) -> Result<Found> {
 /// Runs of ramps for so many simulated seconds, without a lost sample and within the work's budget.
 pub fn endurance(image: &Path, seconds: u32) -> Result<Found> {
     let mut bench = Bench::start(image, LAW, 7)?;
-    // As many applications as the brake bears for ever, each run after the other: 33 kJ each, of which its default
-    // parameters let 15 kW go at their limit.
-    let profile = Profile {
-        applications: 100,
-        cool_s: 1.2,
-        ..RAMP
-    };
-    bench.begin(profile)?;
+    bench.begin(FOR_EVER)?;
     while bench.samples < u64::from(seconds) * 1_000 {
         bench.sample()?;
         if bench.state() == State::Done {
             bench.must(Command::Arm)?;
-            bench.must(Command::Start { profile })?;
+            bench.must(Command::Start { profile: FOR_EVER })?;
         }
     }
     let heard = &bench.host.heard;
@@ -68,21 +59,7 @@ pub fn endurance(image: &Path, seconds: u32) -> Result<Found> {
         status.fault.is_none() && status.link.dropped == 0,
         "{status:?}"
     );
-    let skids = bench
-        .host
-        .heard
-        .events
-        .iter()
-        .filter(|(_, event)| {
-            matches!(
-                event,
-                Event::StateChanged {
-                    to: State::Skid,
-                    ..
-                }
-            )
-        })
-        .count();
+    let skids = bench.host.heard.skids();
     Ok(found(
         &bench,
         format!(

@@ -40,6 +40,14 @@ const RAMP: Profile = Profile {
     cool_s: 0.3,
 };
 
+/// Ramps as often as the brake bears for ever, each run after the other: 33 kJ each, of which its default parameters let
+/// 15 kW go at their limit.
+const FOR_EVER: Profile = Profile {
+    applications: 100,
+    cool_s: 1.2,
+    ..RAMP
+};
+
 /// What a scenario found, in one line; and the most that anything took.
 pub struct Found {
     /// For people.

@@ -6,13 +6,11 @@ use std::path::Path;
 use anyhow::{Context, Result, bail, ensure};
 use muslip_control::brake::BrakeOutput;
 use muslip_control::emulation::{FromFirmware, NS_PER_INSTRUCTION_LOG2};
-use muslip_record::{
-    Command, Event, LINK_BYTES_PER_SECOND, LinkCounters, Parameters, Profile, State,
-};
+use muslip_record::{Command, LINK_BYTES_PER_SECOND, LinkCounters, Parameters, State};
 
-use super::{Found, LAW, RAMP};
+use super::{FOR_EVER, Found, LAW};
 use crate::bench::Worst;
-use crate::host::Host;
+use crate::host::{Host, until};
 use crate::qemu::Qemu;
 use crate::rig::Rig;
 
@@ -120,25 +118,14 @@ impl Paced {
         Ok(())
     }
 
-    fn until(&mut self, state: State, samples: u32) -> Result<()> {
-        for _ in 0..samples {
-            if self.state() == state {
-                return Ok(());
-            }
-            self.sample()?;
-        }
-        bail!(
-            "{state:?} is not reached within {samples} samples, but {:?}; events {:?}",
-            self.state(),
-            self.host.heard.events
+    fn until(&mut self, state: State) -> Result<()> {
+        until(
+            self,
+            |paced| &paced.host.heard,
+            Self::sample,
+            state,
+            PATIENCE_SAMPLES,
         )
-    }
-
-    fn state(&self) -> State {
-        self.host
-            .heard
-            .sample
-            .map_or(State::Idle, |sample| sample.state)
     }
 
     /// Says no more, and lets the wire bring what was said.
@@ -154,21 +141,15 @@ impl Paced {
 /// sample late, every command answered, every sample told of.
 pub fn true_pace(image: &Path, seconds: u32) -> Result<Found> {
     let mut paced = Paced::start(image)?;
-    // As the endurance run's: as often as the brake bears for ever.
-    let profile = Profile {
-        applications: 100,
-        cool_s: 1.2,
-        ..RAMP
-    };
     (0..200).try_for_each(|_| paced.sample())?;
     let (settled, given) = (paced.samples, paced.given);
     let mut runs = 0;
     while paced.samples < seconds * 1_000 {
-        if matches!(paced.state(), State::Idle | State::Done) {
+        if matches!(paced.host.heard.state(), State::Idle | State::Done) {
             paced.frame(Command::Arm)?;
-            paced.until(State::Armed, PATIENCE_SAMPLES)?;
-            paced.frame(Command::Start { profile })?;
-            paced.until(State::SpinUp, PATIENCE_SAMPLES)?;
+            paced.until(State::Armed)?;
+            paced.frame(Command::Start { profile: FOR_EVER })?;
+            paced.until(State::SpinUp)?;
             runs += 1;
         }
         paced.sample()?;
@@ -201,19 +182,7 @@ pub fn true_pace(image: &Path, seconds: u32) -> Result<Found> {
         status.fault.is_none() && status.link == expected,
         "{status:?}"
     );
-    let skids = heard
-        .events
-        .iter()
-        .filter(|(_, event)| {
-            matches!(
-                event,
-                Event::StateChanged {
-                    to: State::Skid,
-                    ..
-                }
-            )
-        })
-        .count();
+    let skids = heard.skids();
     ensure!(skids > 0, "no skid in {} samples", paced.samples);
     ensure!(
         paced.waited < BYTE_CYCLES,
