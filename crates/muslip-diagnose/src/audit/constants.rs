@@ -64,6 +64,8 @@ pub const LEAK_SURE: f64 = 0.9995;
 pub const LEAK_LEVEL: f64 = 0.98;
 /// Correlation of the noises from which a column copies it: two sensors' noises have none.
 pub const LEAK_COPIES: f64 = 0.25;
+/// What columns together leave of the drag may grow so many times without one of them that it had no part in it.
+pub const LEAK_IDLE: f64 = 2.0;
 /// Lowest frequency at which a line is looked for, Hz: brakes are worked at lower ones.
 pub const HUM_LOWEST_HZ: f64 = 12.0;
 /// Length of the windows that hum is looked for in, s.

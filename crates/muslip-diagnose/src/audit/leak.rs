@@ -1,6 +1,8 @@
 //! Columns that reproduce the drag without the tyre law.
 
-use super::constants::{LEAK_COPIES, LEAK_LEVEL, LEAK_SURE};
+use nalgebra::{DMatrix, DVector};
+
+use super::constants::{LEAK_COPIES, LEAK_IDLE, LEAK_LEVEL, LEAK_SURE};
 use super::finding::{Finding, Word};
 use crate::campaign::Run;
 
@@ -34,7 +36,7 @@ fn rough(x: &[f64]) -> impl Iterator<Item = f64> + Clone + '_ {
     x.windows(4).map(|w| w[0] - 3.0 * w[1] + 3.0 * w[2] - w[3])
 }
 
-/// Columns that follow the drag to within a thousandth, or nearly so and copy its noise.
+/// Columns that reproduce the drag, alone or together.
 #[must_use]
 pub fn leaks(runs: &[Run]) -> Vec<Finding> {
     let mut names: Vec<&str> = runs
@@ -43,8 +45,123 @@ pub fn leaks(runs: &[Run]) -> Vec<Finding> {
         .collect();
     names.sort_unstable();
     names.dedup();
+    let alone = copies(runs, &names);
+    names.retain(|name| alone.iter().all(|found| found.channel != *name));
+    let together = components(runs, names);
+    alone.into_iter().chain(together).collect()
+}
+
+fn leak(name: &str, (level, count): (f64, f64), statement: String) -> Finding {
+    let std = (1.0 - level * level) / count.sqrt();
+    Finding {
+        relative_to: "drag_force_n".to_owned(),
+        ..Finding::of(name, Word::Leaks, (level, std), "1")
+    }
+    .saying(statement)
+}
+
+/// Squares of the drag and of columns, one row a sample at which all were read.
+struct Squares {
+    drag: DVector<f64>,
+    columns: DMatrix<f64>,
+}
+
+impl Squares {
+    fn new(runs: &[Run], names: &[&str]) -> Option<Self> {
+        let mut drag = Vec::new();
+        let mut columns = Vec::new();
+        for run in runs {
+            let own: Option<Vec<&[f64]>> = names
+                .iter()
+                .map(|name| {
+                    let (_, column) = run.extra.iter().find(|(own, _)| own == name)?;
+                    (column.len() == run.drag_force_n.len()).then_some(column.as_slice())
+                })
+                .collect();
+            let own = own?;
+            for (k, force) in run.drag_force_n.iter().enumerate() {
+                let read = |x: f64| x.abs() < 1e15;
+                if read(*force) && own.iter().all(|column| read(column[k])) {
+                    drag.push(force * force);
+                    columns.extend(own.iter().map(|column| column[k] * column[k]));
+                }
+            }
+        }
+        let columns = DMatrix::from_row_iterator(drag.len(), names.len(), columns);
+        Some(Self {
+            drag: DVector::from_vec(drag),
+            columns,
+        })
+    }
+
+    /// Share of the drag's square that a sum of these columns' squares leaves; none where they are too few, or say nothing.
+    fn left(&self, chosen: &[usize]) -> Option<f64> {
+        let rows = self.drag.len();
+        if rows <= 50 + chosen.len() {
+            return None;
+        }
+        let mut sums = self.columns.select_columns(chosen);
+        for mut column in sums.column_iter_mut() {
+            let mean = column.mean();
+            column.add_scalar_mut(-mean);
+            let size = column.norm();
+            if !(size > 0.0) {
+                return None;
+            }
+            column /= size;
+        }
+        let drag = self.drag.add_scalar(-self.drag.mean());
+        let whole = drag.norm_squared();
+        let products = sums.tr_mul(&sums) + DMatrix::identity(chosen.len(), chosen.len()) * 1e-12;
+        let shares = products.cholesky()?.solve(&sums.tr_mul(&drag));
+        (whole > 0.0).then(|| (drag - sums * shares).norm_squared() / whole)
+    }
+}
+
+/// Columns of which the drag is the size: a force made from accelerations along and across. No fewer of them will do.
+fn components(runs: &[Run], names: Vec<&str>) -> Vec<Finding> {
+    let Some(squares) = Squares::new(runs, &names) else {
+        return Vec::new();
+    };
+    let mut chosen: Vec<usize> = (0..names.len()).collect();
+    let Some(mut left) = squares.left(&chosen) else {
+        return Vec::new();
+    };
+    let least = left;
+    loop {
+        let without = |out: usize| {
+            let fewer: Vec<usize> = chosen.iter().copied().filter(|&i| i != out).collect();
+            Some((squares.left(&fewer)?, fewer))
+        };
+        let fewer = chosen.iter().filter_map(|&out| without(out));
+        match fewer.min_by(|a, b| a.0.total_cmp(&b.0)) {
+            Some((more, fewer)) if !fewer.is_empty() && more < LEAK_IDLE * least + f64::EPSILON => {
+                (left, chosen) = (more, fewer);
+            }
+            _ => break,
+        }
+    }
+    let level = (1.0 - left).max(0.0).sqrt();
+    if !(level > LEAK_SURE) {
+        return Vec::new();
+    }
+    let chosen: Vec<&str> = chosen.iter().map(|&i| names[i]).collect();
+    let said = format!(
+        "The drag is the size of {} (correlation {level:.4} of its square): they explain nothing.",
+        chosen.join(" and ")
+    );
+    let count = squares.drag.len() as f64;
+    chosen
+        .iter()
+        .map(|name| leak(name, (level, count), said.clone()))
+        .collect()
+}
+
+/// Columns that follow the drag to within a thousandth, or nearly so and copy its noise.
+fn copies(runs: &[Run], names: &[&str]) -> Vec<Finding> {
     names
-        .into_iter()
+        .iter()
+        .copied()
         .filter_map(|name| {
             let both: Vec<(&[f64], &[f64])> = runs
                 .iter()
@@ -59,13 +176,10 @@ pub fn leaks(runs: &[Run]) -> Vec<Finding> {
             let leaks = count > 50.0
                 && (level.abs() > LEAK_SURE || (level.abs() > LEAK_LEVEL && copied.abs() > LEAK_COPIES));
             leaks.then(|| {
-                Finding {
-                    relative_to: "drag_force_n".to_owned(),
-                    ..Finding::of(name, Word::Leaks, (level, (1.0 - level * level) / count.sqrt()), "1")
-                }
-                .saying(format!(
+                let said = format!(
                     "The column {name} reproduces the drag (correlation {level:.4}, of the noise alone {copied:.2}): it explains nothing."
-                ))
+                );
+                leak(name, (level, count), said)
             })
         })
         .collect()
@@ -91,5 +205,40 @@ mod tests {
         assert_eq!(leaks(&[run(copy)]).len(), 1);
         assert!(leaks(&[run(like)]).is_empty());
         assert!(leaks(&[]).is_empty());
+    }
+
+    #[test]
+    fn a_force_made_from_accelerations_leaks_both_of_them_and_nothing_else() {
+        let across: Vec<f64> = (0..400)
+            .map(|k| 5.0 * (f64::from(k) * 0.01).sin())
+            .collect();
+        let along: Vec<f64> = (0..400)
+            .map(|k| 0.5 * (f64::from(k) * 0.037).cos())
+            .collect();
+        let yaw: Vec<f64> = (0..400).map(|k| (f64::from(k) * 0.011).sin()).collect();
+        let size = |noise: f64| -> Vec<f64> {
+            let both = across.iter().zip(&along).enumerate();
+            both.map(|(k, (a, b))| {
+                1.7 * a.hypot(*b) + noise * f64::from((k as i32 * 7919) % 101 - 50) / 50.0
+            })
+            .collect()
+        };
+        let run = |drag: Vec<f64>| Run {
+            time_s: (0..400).map(f64::from).collect(),
+            drag_force_n: drag,
+            extra: vec![
+                ("yaw_rate_rad_s".to_owned(), yaw.clone()),
+                ("lateral_m_s2".to_owned(), across.clone()),
+                ("longitudinal_m_s2".to_owned(), along.clone()),
+            ],
+            ..Run::default()
+        };
+        let told = |drag: Vec<f64>| -> Vec<String> {
+            let found = leaks(&[run(drag)]);
+            found.into_iter().map(|f| f.channel).collect()
+        };
+        assert_eq!(told(size(0.0)), ["lateral_m_s2", "longitudinal_m_s2"]);
+        // A load cell beside them errs by its own noise.
+        assert!(told(size(0.5)).is_empty());
     }
 }

@@ -78,6 +78,17 @@ impl Audit {
         self.resampled.iter().chain(seen).cloned().collect()
     }
 
+    /// The run without the columns that reproduce the drag: what they tell of it they have from it.
+    #[must_use]
+    pub fn without_leaks(&self, mut run: Run) -> Run {
+        let leaks = |column: &str| {
+            let mut findings = self.findings.iter();
+            findings.any(|found| found.finding == Word::Leaks && found.channel == column)
+        };
+        run.extra.retain(|(column, _)| !leaks(column));
+        run
+    }
+
     /// Whether the vehicle speed passes a filter slower than the other channels'.
     #[must_use]
     pub fn vehicle_filtered(&self) -> bool {
@@ -333,5 +344,22 @@ mod tests {
         let mut short = run(0.0, 0.0, 0.0);
         short.drag_force_n.clear();
         assert!(!audit(&rig(), &[short]).vehicle_late.std.is_finite());
+    }
+
+    #[test]
+    fn a_column_that_reproduces_the_drag_is_no_candidate_and_others_stay() {
+        let found = Audit {
+            findings: vec![
+                Finding::of("frame_force_n", Word::Leaks, (1.0, 0.0), "1"),
+                Finding::of("temperature_c", Word::Drifts, (0.1, 0.01), "degC/s"),
+            ],
+            ..Audit::default()
+        };
+        let column = |name: &str| (name.to_owned(), vec![0.0]);
+        let run = Run {
+            extra: vec![column("frame_force_n"), column("temperature_c")],
+            ..Run::default()
+        };
+        assert_eq!(found.without_leaks(run).extra, [column("temperature_c")]);
     }
 }
