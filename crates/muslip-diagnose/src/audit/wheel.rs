@@ -19,8 +19,9 @@ struct Wheel<'a> {
     step: f64,
 }
 
-/// Delays of the brake that the refinement starts from, s.
-const BRAKES_S: [f64; 5] = [0.0, -0.02, -0.01, 0.01, 0.02];
+/// Delays of the brake that the refinement starts from, s: a rack's either way, and what a brake's lag makes its reading
+/// early by.
+const BRAKES_S: [f64; 7] = [0.0, -0.02, -0.01, 0.01, 0.02, -0.05, -0.1];
 /// Seconds read ahead of a block.
 const RUN_UP_S: f64 = 0.15;
 /// Width over which the wheel speed is averaged for the instruments, s.

@@ -5,8 +5,10 @@ use super::held::without_holds;
 use crate::audit::{Audit, Timing as Late};
 use crate::campaign::{Rig, Run};
 use crate::constants::{
-    ALIKE_LATE, ALIKE_LATE_S, AUDIT_REACH, LEAST_BRAKE_EARLY_S, LEAST_DRAG_LATE_S, LEAST_RELIABLE,
-    LEAST_STD_S, LEAST_STDS_TOLD, LEAST_USABLE, UNKNOWN_STDS, VAGUE_S,
+    ALIKE_LATE, ALIKE_LATE_S, AUDIT_REACH, FAR_BETTER, HEARD_S, IN_STEP_S,
+    LEAST_BRAKE_EARLY_IN_STEP_S, LEAST_BRAKE_EARLY_S, LEAST_DRAG_LATE_S, LEAST_RELIABLE,
+    LEAST_STD_S, LEAST_STDS_TOLD, LEAST_USABLE, LONGEST_TO_EARLY, UNKNOWN_STDS, VAGUE_AUDIT_S,
+    VAGUE_S,
 };
 use crate::data::Data;
 use crate::innovations::blocks::blocks;
@@ -30,6 +32,8 @@ pub struct Timing {
     pub vehicle: Late,
     /// Of the brake.
     pub brake: Late,
+    /// Whether the audit hears the brake's lateness: the fit alone may come to rest far from it.
+    brake_heard: bool,
     /// How late the drag is left, in s.
     drag: f64,
 }
@@ -44,22 +48,23 @@ impl Timing {
         }
     }
 
-    /// How late the drag is, in s, where a speed and all other channels are early, and alike. Beside a wheel's speed and
-    /// a brake that are, a vehicle's that is late says nothing against it: its receiver is.
+    /// How late the drag is, in s, where a speed and all other channels are early, and alike: by what all of them are,
+    /// for what one is early by beyond that is its own. Beside a wheel's speed and a brake that are, a vehicle's that is
+    /// late says nothing against it: its receiver is.
     fn drag_late(&self) -> Option<f64> {
         let known = |l: &&Late| l.std < VAGUE_S;
         let early = |l: &Late| known(&l) && l.value < 0.0;
         let late_receiver = early(&self.wheel) && early(&self.brake) && !early(&self.vehicle);
         let all = [self.wheel, self.brake, self.vehicle];
         let asked = &all[..if late_receiver { 2 } else { 3 }];
-        let told = || asked.iter().filter(known);
-        let weight: f64 = told().map(|l| l.std.powi(-2)).sum();
-        let mean = told().map(|l| -l.value * l.std.powi(-2)).sum::<f64>() / weight;
-        let alike =
-            |l: &Late| (-l.value - mean).abs() < ALIKE_LATE * mean + ALIKE_LATE_S + 2.0 * l.std;
         // A brake alone says as little of the drag as the drag does of it.
         let speed = [self.wheel, self.vehicle].iter().any(|l| known(&l));
-        (speed && mean > LEAST_DRAG_LATE_S && told().all(alike)).then_some(mean)
+        let told = asked.iter().filter(known).map(|l| -l.value);
+        let late = told.fold(f64::INFINITY, f64::min);
+        let alike =
+            |l: &Late| (-l.value - late).abs() < ALIKE_LATE * late + ALIKE_LATE_S + 2.0 * l.std;
+        let heard = |l: &&Late| l.std < HEARD_S;
+        (speed && late > LEAST_DRAG_LATE_S && asked.iter().filter(heard).all(alike)).then_some(late)
     }
 
     /// Leaves the drag as late as it is against all others.
@@ -73,20 +78,33 @@ impl Timing {
         }
     }
 
-    /// What is taken off where a fresh run is predicted: recordings in which the vehicle's speed hardly changes say
-    /// nothing of its lateness, and a run in which it does would be predicted by a guess.
+    /// What is taken off where a fresh run is predicted. Recordings in which the vehicle's speed hardly changes say
+    /// nothing of its lateness: it is then taken to be the wheel's, so that a run in which it does change has its slip
+    /// as recorded, and a guess moves no speed against the other.
     #[must_use]
     pub fn told(&self) -> Lateness {
-        let told = self.vehicle.value.abs() > LEAST_STDS_TOLD * self.vehicle.std;
+        let apart = self.vehicle.value - self.wheel.value;
+        let told = apart.abs() > LEAST_STDS_TOLD * self.vehicle.std;
+        let wheel = self.late.wheel + self.late.wheel_by_turn;
         Lateness {
-            vehicle: if told { self.late.vehicle } else { 0.0 },
+            vehicle: if told { self.late.vehicle } else { wheel },
             ..self.late
         }
     }
 
-    /// Whether the brake's reading comes before the torque does.
+    /// Whether the brake's reading comes before the torque does: by more than a filter or a logger out of step makes it,
+    /// or by less where the speeds show that the loggers are in step.
     fn brake_early(&self) -> bool {
-        self.brake.std < VAGUE_S && self.brake.value < -LEAST_BRAKE_EARLY_S
+        let [wheel, vehicle] = [self.wheel, self.vehicle].map(|late| self.against_drag(late));
+        let in_step = |l: Late| l.value.abs() < IN_STEP_S + 2.0 * l.std;
+        let same_time =
+            wheel.std < IN_STEP_S && in_step(wheel) && (in_step(vehicle) || vehicle.std > HEARD_S);
+        let least = if same_time {
+            LEAST_BRAKE_EARLY_IN_STEP_S
+        } else {
+            LEAST_BRAKE_EARLY_S
+        };
+        self.brake.std < VAGUE_S && self.brake.value < -least
     }
 
     /// Leaves the brake's reading as early as it is.
@@ -98,7 +116,7 @@ impl Timing {
     /// What the timing does not tell of the chain.
     #[must_use]
     pub fn untold(&self) -> Untold {
-        let known = |late: &Late| late.std < 0.01;
+        let known = |late: &Late| late.std < HEARD_S;
         let channels_s = [self.wheel, self.brake]
             .into_iter()
             .filter(known)
@@ -110,7 +128,17 @@ impl Timing {
             .filter(|late| late.std < VAGUE_S)
             .map(|late| UNKNOWN_STDS * late.std - self.against_drag(late).value)
             .fold(0.0, f64::max);
-        Untold { channels_s, drag_s }
+        // As found, for what is left to physics is early no more; against the drag as it is left.
+        let brake_s = if self.brake_heard && self.brake.std < HEARD_S {
+            UNKNOWN_STDS * self.brake.std - (self.found.brake + self.drag)
+        } else {
+            f64::INFINITY
+        };
+        Untold {
+            channels_s,
+            drag_s,
+            brake_s,
+        }
     }
 }
 
@@ -122,6 +150,8 @@ pub struct Untold {
     pub channels_s: f64,
     /// How late the drag may be against the wheel's or the vehicle's speed.
     pub drag_s: f64,
+    /// How early the brake may be read.
+    pub brake_s: f64,
 }
 
 impl Untold {
@@ -130,6 +160,13 @@ impl Untold {
     #[must_use]
     pub fn shortest_of_tyre_s(self) -> f64 {
         0.5 * self.drag_s
+    }
+
+    /// Longest memory of the brake that may be told: one that delays its torque shows its reading early, and what does
+    /// not is how the channels' kernels differ.
+    #[must_use]
+    pub fn longest_of_brake_s(self) -> f64 {
+        (LONGEST_TO_EARLY * self.brake_s).max(0.0)
     }
 }
 
@@ -205,6 +242,7 @@ impl Recorded<'_> {
         effort: Effort,
     ) -> Option<(Data, Timing, Judged)> {
         timing.found = timing.late;
+        timing.brake_heard = self.audit.brake_late.std.is_finite();
         let drag = timing.drag_late();
         timing.leave(drag.unwrap_or(0.0));
         let brake = timing.brake_early();
@@ -237,7 +275,7 @@ impl Timing {
     fn asked(&mut self, audit: &Audit, shift: [f64; 4], std: [f64; 3]) {
         let late = self.late;
         let value = |known: &Late, value: f64, std: f64| Late {
-            value: within(known, value),
+            value: within(known, value, std),
             std,
         };
         let wheel = late.wheel + late.wheel_by_turn + shift[0] + shift[3];
@@ -257,15 +295,19 @@ impl Timing {
         };
         let late = &mut self.late;
         late.wheel += step(shift[0]);
-        late.vehicle += step(shift[1]);
+        // A speed that hardly changes tells no lateness: each pass would shift it by as much as it may.
+        if self.vehicle.std < MOST_SHIFT_S * PASSES as f64 {
+            late.vehicle += step(shift[1]);
+        }
         late.brake += step(shift[2]);
         // A ring's period delays, never hastens.
         late.wheel_by_turn = (late.wheel_by_turn + step(shift[3])).max(0.0);
         // What the audit knows is not given up for what a law, still wrong, would like.
         let by_turn = late.wheel_by_turn;
-        late.wheel = within(&audit.wheel_late, late.wheel + by_turn) - by_turn;
-        late.vehicle = within(&audit.vehicle_late, late.vehicle);
-        late.brake = within(&audit.brake_late, late.brake);
+        let wheel = late.wheel + by_turn;
+        late.wheel = within(&audit.wheel_late, wheel, self.wheel.std) - by_turn;
+        late.vehicle = within(&audit.vehicle_late, late.vehicle, self.vehicle.std);
+        late.brake = within(&audit.brake_late, late.brake, self.brake.std);
     }
 }
 
@@ -294,10 +336,12 @@ fn known_to(audit: &Audit) -> TimingStd {
     }
 }
 
-/// A lateness, at most so many standard deviations from what the audit found.
-fn within(known: &Late, value: f64) -> f64 {
+/// A lateness fitted with this standard deviation, at most so many of the audit's from what that found; a vague one does not
+/// hold a fit that knows it far better.
+fn within(known: &Late, value: f64, std: f64) -> f64 {
     let reach = AUDIT_REACH * known.std;
-    if reach.is_finite() {
+    let holds = known.std < VAGUE_AUDIT_S || std > FAR_BETTER * known.std;
+    if reach.is_finite() && holds {
         value.clamp(known.value - reach, known.value + reach)
     } else {
         value
@@ -433,16 +477,28 @@ mod tests {
     }
 
     #[test]
-    fn a_drag_that_all_channels_precede_alike_is_late() {
+    fn a_drag_that_all_channels_precede_alike_is_late_by_what_all_of_them_are_early() {
         let late = timing(-0.010, -0.011, -0.010).drag_late();
-        assert!((late.unwrap() - 0.0103).abs() < 5e-4);
+        assert!((late.unwrap() - 0.010).abs() < 1e-12);
         assert_eq!(timing(0.010, 0.011, 0.010).drag_late(), None);
+        // Each logger out of step by its own: what the others are early by beyond the wheel is theirs.
+        assert_eq!(timing(-0.010, -0.013, -0.014).drag_late(), Some(0.010));
+        assert_eq!(timing(-0.010, -0.018, -0.019).drag_late(), None);
+    }
+
+    #[test]
+    fn a_vehicle_speed_that_is_late_speaks_against_a_late_drag_however_vague() {
+        let mut no_brake = timing(-0.013, 0.032, 0.0);
+        (no_brake.vehicle.std, no_brake.brake.std) = (0.003, 0.02);
+        assert_eq!(no_brake.drag_late(), None);
+        // As vague as this it says nothing.
+        no_brake.vehicle.std = 0.03;
+        assert_eq!(no_brake.drag_late(), Some(0.013));
     }
 
     #[test]
     fn a_late_receiver_says_nothing_against_a_late_drag() {
-        let late = timing(-0.010, 0.030, -0.011).drag_late();
-        assert!((late.unwrap() - 0.0105).abs() < 5e-4);
+        assert_eq!(timing(-0.010, 0.030, -0.011).drag_late(), Some(0.010));
         // A filter of the drag's that the brake has, too.
         assert_eq!(timing(-0.010, 0.030, 0.000).drag_late(), None);
         assert_eq!(timing(0.004, 0.030, -0.011).drag_late(), None);
@@ -471,7 +527,7 @@ mod tests {
     }
 
     #[test]
-    fn a_lateness_of_the_vehicle_that_is_not_told_from_none_is_not_taken_off_a_fresh_run() {
+    fn a_lateness_of_the_vehicle_that_is_not_told_from_the_wheels_is_the_wheels_on_a_fresh_run() {
         let mut timing = timing(0.010, -0.055, 0.0);
         timing.late = Lateness {
             wheel: 0.010,
@@ -480,7 +536,14 @@ mod tests {
         };
         assert_eq!(timing.told(), timing.late);
         timing.vehicle.std = 0.09;
-        assert_eq!((timing.told().wheel, timing.told().vehicle), (0.010, 0.0));
+        assert_eq!((timing.told().wheel, timing.told().vehicle), (0.010, 0.010));
+        // None, and surely so.
+        timing.late.vehicle = 1e-4;
+        timing.vehicle = Late {
+            value: 1e-4,
+            std: 5e-4,
+        };
+        assert_eq!((timing.told().wheel, timing.told().vehicle), (0.010, 1e-4));
     }
 
     #[test]
@@ -491,10 +554,60 @@ mod tests {
     }
 
     #[test]
+    fn a_brake_read_a_little_early_is_the_brake_s_where_the_speeds_are_in_step() {
+        assert!(timing(0.0005, -0.001, -0.008).brake_early());
+        assert!(!timing(0.0005, -0.001, -0.004).brake_early(), "too little");
+        // A logger out of step may be the brake's, too.
+        assert!(!timing(0.006, -0.001, -0.008).brake_early());
+        assert!(!timing(0.0005, 0.012, -0.008).brake_early());
+        // Left late with the drag, the speeds are in step with nothing.
+        let mut left = timing(-0.010, -0.010, -0.018);
+        left.leave(0.010);
+        assert!(!left.brake_early());
+    }
+
+    #[test]
+    fn no_lag_of_the_brake_is_longer_than_its_reading_is_early() {
+        let found = |wheel: f64, brake: f64| {
+            let mut timing = timing(wheel, wheel, brake);
+            timing.found = Lateness {
+                wheel,
+                vehicle: wheel,
+                brake,
+                ..Lateness::default()
+            };
+            timing.brake_heard = true;
+            timing
+        };
+        // Three standard deviations are 0.9 ms.
+        let mut early = found(0.0, -0.020);
+        early.leave_brake();
+        assert!((early.untold().brake_s - 0.0209).abs() < 1e-9);
+        let mut late = found(0.0, 0.002);
+        assert_eq!(late.untold().longest_of_brake_s(), 0.0);
+        late.brake_heard = false;
+        assert_eq!(late.untold().longest_of_brake_s(), f64::INFINITY);
+        // Early with everything: the drag is late.
+        let mut drag = found(-0.012, -0.012);
+        drag.leave(0.012);
+        assert!((drag.untold().brake_s - 9e-4).abs() < 1e-9);
+    }
+
+    #[test]
     fn a_delay_is_told_against_the_drag_as_recorded() {
         let mut timing = timing(-0.004, 0.03, -0.006);
         timing.leave(0.006);
         assert!((timing.vehicle.value - 0.036).abs() < 1e-12);
         assert!((timing.against_drag(timing.vehicle).value - 0.03).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_vague_audit_holds_no_fit_that_knows_far_better() {
+        let audit = |std: f64| Late { value: 0.037, std };
+        assert!((within(&audit(0.001), 0.002, 4e-4) - 0.035).abs() < 1e-12);
+        assert!((within(&audit(0.010), 0.002, 4e-4) - 0.002).abs() < 1e-12);
+        // Neither knows: the audit, which has no law that may be wrong, is not given up.
+        assert!((within(&audit(0.010), 0.002, 0.2) - 0.017).abs() < 1e-12);
+        assert!((within(&audit(f64::INFINITY), 0.002, 0.2) - 0.002).abs() < 1e-12);
     }
 }

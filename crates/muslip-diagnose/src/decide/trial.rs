@@ -13,7 +13,7 @@ use crate::data::Data;
 use crate::innovations::dependence::Dependence;
 use crate::innovations::hypothesis::{Beside, Judged, Unseen};
 use crate::law::{closest, squares};
-use crate::mechanism::{Balance, Id, Kind};
+use crate::mechanism::{Balance, Id, Kind, Memory};
 use crate::number::mean_and_std;
 
 /// What a trial adds to a model.
@@ -82,7 +82,7 @@ pub struct Trial {
     pub fed_by_chain: bool,
     /// Whether it is a memory: what was before counts.
     pub remembers: bool,
-    /// Whether its memory is longer than what the chain's own timing was off by.
+    /// Whether its memory is longer than what the chain's own timing was off by, and no longer than the channels show.
     pub outlasts_chain: bool,
     /// Readings in the balances that are judged.
     pub readings: usize,
@@ -236,6 +236,15 @@ impl<'a> Before<'a> {
             of_tyre.then(|| self.untold.shortest_of_tyre_s()),
         ];
         let chain_s = shortest_s.into_iter().flatten().fold(0.0, f64::max);
+        let of_brake = term.is_some_and(|(_, entry, _)| {
+            let guide = data.catalogue.get(entry).guide();
+            guide.kind == Kind::Wheel && guide.memory == Memory::Kernel
+        });
+        let longest_s = if of_brake {
+            self.untold.longest_of_brake_s()
+        } else {
+            f64::INFINITY
+        };
         let price = PRICE_OF_PARAMETER * free + PRICE_OF_NAME;
         Trial {
             claim,
@@ -248,7 +257,8 @@ impl<'a> Before<'a> {
             fed_by_chain: term
                 .is_some_and(|(_, entry, _)| data.catalogue.get(entry).fed_by_chain()),
             remembers: memory_s.is_some(),
-            outlasts_chain: memory_s.is_none_or(|(memory, least)| memory > least.max(chain_s)),
+            outlasts_chain: memory_s
+                .is_none_or(|(memory, least)| memory > least.max(chain_s) && memory < longest_s),
             predicts,
             readings,
             size,
@@ -385,10 +395,11 @@ fn seen_on_unseen_runs(trial: &Trial) -> bool {
     let (mean, t) = trial.unseen;
     match trial.claim {
         Claim::Mechanism(..) => {
-            let least = if trial.fed_by_chain {
-                LEAST_T
-            } else {
+            let clearly = trial.predicts > CLEARLY_PREDICTED;
+            let least = if clearly && !trial.fed_by_chain {
                 LEAST_T_NOT_FED
+            } else {
+                LEAST_T
             };
             mean > 0.0 && (t >= least || clear_where_it_is(trial))
         }

@@ -46,14 +46,18 @@ pub fn diagnose(rig: &Rig, runs: Vec<Run>, progress: Progress<'_>) -> Diagnosis 
     let averaged = total.div_ceil(MOST_SAMPLES).max(1);
     // One after the other, so that the long recordings do not outlive their means.
     let runs: Vec<Run> = runs.into_iter().map(|run| run.averaged(averaged)).collect();
+    progress(0.1, "auditing the measuring chain");
+    let audit = audit(rig, &runs);
+    let runs: Vec<Run> = runs
+        .into_iter()
+        .map(|run| audit.without_leaks(run))
+        .collect();
     let given = Given {
         data: Data::new(rig, &runs),
         rig,
         runs: &runs,
         averaged,
     };
-    progress(0.1, "auditing the measuring chain");
-    let audit = audit(rig, &runs);
     progress(0.2, "weighing mechanisms");
     let nothing_kept = Split::default();
     let Some(answer) = Answer::of(&given, &nothing_kept, &audit, None) else {
@@ -190,8 +194,6 @@ impl Answer<'_> {
                 named.evidence.confidence = named.evidence.confidence.min(DOUBTED);
             }
         }
-        // What unseen runs do not bear out is not the strongest, whatever it gained.
-        mechanisms.sort_by_key(|named| named.evidence.confidence <= DOUBTED);
     }
 
     /// The diagnosis, proven by what the argument came to without what was kept for that.
@@ -225,6 +227,8 @@ impl Answer<'_> {
         if says_something && !predicts.known {
             self.doubt(&mut mechanisms);
         }
+        // What is no likelier than not, or not borne out by unseen runs, is not the strongest, whatever it gained.
+        mechanisms.sort_by_key(|named| named.evidence.confidence <= DOUBTED);
         let unexplained = self.unexplained();
         let verdict = match (mechanisms.is_empty(), unexplained.is_empty()) {
             (true, true) => Verdict::Consistent,

@@ -4,7 +4,9 @@ use std::collections::BTreeMap;
 
 use super::answer::Answer;
 use crate::audit::Timing;
-use crate::constants::{AUDITED, LEAST_DELAY_S, PREDICTED_APART, SURE_DELAY, VAGUE_DELAY_S};
+use crate::constants::{
+    AUDITED, FORM_OF_DELAY_S, LEAST_DELAY_S, PREDICTED_APART, SURE_DELAY, VAGUE_DELAY_S,
+};
 use crate::decide::{Claim, Trial, softness, stands};
 use crate::figures::figures;
 use crate::innovations::dependence::Dependence;
@@ -17,7 +19,7 @@ use crate::separating::separating_test;
 
 /// Smallest delay in s that is named where the timing is as sure as this.
 pub(super) fn least_delay(late: &Timing) -> f64 {
-    (SURE_DELAY * late.std.max(1e-4)).max(LEAST_DELAY_S)
+    (FORM_OF_DELAY_S + SURE_DELAY * late.std.max(1e-4)).max(LEAST_DELAY_S)
 }
 
 impl Answer<'_> {
