@@ -31,6 +31,12 @@ fn correlation(pairs: impl Iterator<Item = (f64, f64)> + Clone) -> (f64, f64) {
     (value, count)
 }
 
+/// Another column beside the drag.
+fn column<'a>(run: &'a Run, name: &str) -> Option<&'a [f64]> {
+    let (_, values) = run.extra.iter().find(|(own, _)| own == name)?;
+    (values.len() == run.drag_force_n.len()).then_some(values)
+}
+
 /// Third differences: nearly all noise.
 fn rough(x: &[f64]) -> impl Iterator<Item = f64> + Clone + '_ {
     x.windows(4).map(|w| w[0] - 3.0 * w[1] + 3.0 * w[2] - w[3])
@@ -71,13 +77,7 @@ impl Squares {
         let mut drag = Vec::new();
         let mut columns = Vec::new();
         for run in runs {
-            let own: Option<Vec<&[f64]>> = names
-                .iter()
-                .map(|name| {
-                    let (_, column) = run.extra.iter().find(|(own, _)| own == name)?;
-                    (column.len() == run.drag_force_n.len()).then_some(column.as_slice())
-                })
-                .collect();
+            let own: Option<Vec<&[f64]>> = names.iter().map(|name| column(run, name)).collect();
             let own = own?;
             for (k, force) in run.drag_force_n.iter().enumerate() {
                 let read = |x: f64| x.abs() < 1e15;
@@ -127,6 +127,11 @@ fn components(runs: &[Run], names: Vec<&str>) -> Vec<Finding> {
     let Some(mut left) = squares.left(&chosen) else {
         return Vec::new();
     };
+    let level = |left: f64| (1.0 - left).max(0.0).sqrt();
+    // Fewer columns leave no less.
+    if !(level(left) > LEAK_SURE) {
+        return Vec::new();
+    }
     let least = left;
     loop {
         let without = |out: usize| {
@@ -141,7 +146,7 @@ fn components(runs: &[Run], names: Vec<&str>) -> Vec<Finding> {
             _ => break,
         }
     }
-    let level = (1.0 - left).max(0.0).sqrt();
+    let level = level(left);
     if !(level > LEAK_SURE) {
         return Vec::new();
     }
@@ -165,10 +170,7 @@ fn copies(runs: &[Run], names: &[&str]) -> Vec<Finding> {
         .filter_map(|name| {
             let both: Vec<(&[f64], &[f64])> = runs
                 .iter()
-                .filter_map(|run| {
-                    let (_, column) = run.extra.iter().find(|(own, _)| own == name)?;
-                    (column.len() == run.drag_force_n.len()).then_some((run.drag_force_n.as_slice(), column.as_slice()))
-                })
+                .filter_map(|run| Some((run.drag_force_n.as_slice(), column(run, name)?)))
                 .collect();
             let (level, count) =
                 correlation(both.iter().flat_map(|(a, b)| a.iter().copied().zip(b.iter().copied())));
