@@ -3,7 +3,7 @@
 use anyhow::Result;
 
 use crate::setup;
-use crate::step::{cargo, run};
+use crate::step::{CHECKED, cargo, run};
 
 /// Runs the three; the first that fails ends it.
 pub fn run_all() -> Result<()> {
@@ -28,32 +28,26 @@ pub fn run_all() -> Result<()> {
             "--target=thumbv7em-none-eabihf",
         ],
     )?;
-    run(
+    clippy(
         "clippy of the STM32G474's image",
-        cargo(&[
-            "clippy",
-            "--package",
-            "firmware",
+        &[
+            "--package=firmware",
             "--no-default-features",
-            "--features",
-            "stm32g474",
-            "--target",
-            "thumbv7em-none-eabihf",
-            "--locked",
-            "--",
-            "-D",
-            "warnings",
-        ]),
+            "--features=stm32g474",
+            "--target=thumbv7em-none-eabihf",
+        ],
     )?;
     // Libraries only: the command and the core are both called muslip and would overwrite each other.
     let mut documentation = cargo(&["doc", "--workspace", "--lib", "--no-deps", "--locked"]);
+    documentation.args(["--profile", CHECKED]);
     documentation.env("RUSTDOCFLAGS", "-D warnings");
     run("documentation", documentation)
 }
 
-/// Clippy with these arguments, warnings denied.
+/// Clippy with these arguments, warnings denied. In the tests' profile: what the compiler runs itself, macros and scripts of
+/// builds, is then there already.
 fn clippy(name: &str, arguments: &[&str]) -> Result<()> {
-    let mut command = cargo(&["clippy", "--locked"]);
+    let mut command = cargo(&["clippy", "--locked", "--profile", CHECKED]);
     command.args(arguments).args(["--", "-D", "warnings"]);
     run(name, command)
 }

@@ -82,7 +82,7 @@ pub fn run_all() -> Result<()> {
     for target in TARGETS {
         for (features, packages) in TARGET_FEATURES {
             let mut build = cargo(&["build", "--lib", "--locked", "--quiet", "--target", target]);
-            build.args(["--features", features]);
+            build.args(["--profile", CHECKED, "--features", features]);
             for package in packages {
                 build.args(["--package", package]);
             }

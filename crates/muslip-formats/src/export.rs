@@ -113,9 +113,10 @@ mod with_parquet {
 
     use parquet::basic::{Compression, LogicalType, Repetition, Type as Physical, ZstdLevel};
     use parquet::data_type::{BoolType, ByteArray, ByteArrayType, DoubleType};
+    use parquet::errors::ParquetError;
     use parquet::file::metadata::KeyValue;
     use parquet::file::properties::WriterProperties;
-    use parquet::file::writer::SerializedFileWriter;
+    use parquet::file::writer::{SerializedColumnWriter, SerializedFileWriter};
     use parquet::schema::types::Type;
 
     use super::{Cells, ColumnKind};
@@ -186,29 +187,11 @@ mod with_parquet {
         pub fn rows(&mut self, columns: &[Cells<'_>]) -> io::Result<()> {
             let mut group = self.file.next_row_group().map_err(io::Error::other)?;
             let mut columns = columns.iter();
-            while let Some(mut writer) = group.next_column().map_err(io::Error::other)? {
-                let written = match columns.next() {
-                    Some(Cells::Numbers(numbers)) => {
-                        let (levels, values) =
-                            there(numbers, |value| value.is_finite().then_some(*value));
-                        let column = writer.typed::<DoubleType>();
-                        column.write_batch(&values, Some(&levels), None)
-                    }
-                    Some(Cells::Texts(texts)) => {
-                        let text = |text: &Option<String>| text.as_deref().map(ByteArray::from);
-                        let (levels, values) = there(texts, text);
-                        let column = writer.typed::<ByteArrayType>();
-                        column.write_batch(&values, Some(&levels), None)
-                    }
-                    Some(Cells::Truths(truths)) => {
-                        let (levels, values) = there(truths, |truth| *truth);
-                        let column = writer.typed::<BoolType>();
-                        column.write_batch(&values, Some(&levels), None)
-                    }
-                    None => return Err(io::Error::from(io::ErrorKind::InvalidInput)),
+            while let Some(column) = group.next_column().map_err(io::Error::other)? {
+                let Some(cells) = columns.next() else {
+                    return Err(io::Error::from(io::ErrorKind::InvalidInput));
                 };
-                written.map_err(io::Error::other)?;
-                writer.close().map_err(io::Error::other)?;
+                write(column, cells).map_err(io::Error::other)?;
             }
             group.close().map_err(io::Error::other)?;
             Ok(())
@@ -221,6 +204,32 @@ mod with_parquet {
         pub fn finish(self) -> io::Result<W> {
             self.file.into_inner().map_err(io::Error::other)
         }
+    }
+
+    /// Writes one column of a group. Of no sink's type, so that it is compiled, and optimised, here and not once for every sink.
+    fn write(
+        mut column: SerializedColumnWriter<'_>,
+        cells: &Cells<'_>,
+    ) -> Result<(), ParquetError> {
+        match cells {
+            Cells::Numbers(numbers) => {
+                let (levels, values) = there(numbers, |value| value.is_finite().then_some(*value));
+                let typed = column.typed::<DoubleType>();
+                typed.write_batch(&values, Some(&levels), None)?;
+            }
+            Cells::Texts(texts) => {
+                let text = |text: &Option<String>| text.as_deref().map(ByteArray::from);
+                let (levels, values) = there(texts, text);
+                let typed = column.typed::<ByteArrayType>();
+                typed.write_batch(&values, Some(&levels), None)?;
+            }
+            Cells::Truths(truths) => {
+                let (levels, values) = there(truths, |truth| *truth);
+                let typed = column.typed::<BoolType>();
+                typed.write_batch(&values, Some(&levels), None)?;
+            }
+        }
+        column.close()
     }
 
     /// Which cells are there, and what they hold.

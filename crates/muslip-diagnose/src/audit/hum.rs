@@ -1,6 +1,10 @@
 //! Mains hum in the drag: a line at one frequency of the clock, in most windows of all runs.
 
-use realfft::RealFftPlanner;
+use std::sync::Arc;
+
+use rustfft::algorithm::{BluesteinsAlgorithm, Radix4};
+use rustfft::num_complex::Complex;
+use rustfft::{Fft, FftDirection};
 
 use super::constants::{
     HUM_LOWEST_HZ, HUM_NEAR, HUM_ORDERS, HUM_SHARE, HUM_SPREAD, HUM_WINDOW_S, LINE_RATIO,
@@ -67,10 +71,10 @@ fn windows(runs: &[Recording]) -> (Vec<Window>, f64) {
     // Most pieces hold a window.
     spans.sort_by(f64::total_cmp);
     let length = spans[spans.len() / 4].min(HUM_WINDOW_S);
-    let mut planner = RealFftPlanner::<f64>::new();
     let mut out = Vec::new();
     for (run, own) in runs.iter().zip(pieces) {
         let angle = angle(run);
+        let transform = transform(((length / run.step).round() as usize).max(8));
         for (start, end) in own {
             let rough = rough(&run.time, &run.drag.clean, start, end);
             let mut from = start;
@@ -79,15 +83,12 @@ fn windows(runs: &[Recording]) -> (Vec<Window>, f64) {
                 let to = from + run.time[from..end].partition_point(|t| *t < until);
                 let time = &run.time[from..to];
                 let rough = &rough[from - start..to - start];
-                let whole = time[time.len() - 1] - time[0] > 0.95 * length;
-                if whole
-                    && let Some(spectrum) = spectrum(time, rough, run.step, &mut planner, length)
-                {
+                if time[time.len() - 1] - time[0] > 0.95 * length {
                     out.push(Window {
                         time: time.to_vec(),
                         angle: angle[from..to].to_vec(),
                         rough: rough.to_vec(),
-                        spectrum,
+                        spectrum: spectrum(time, rough, run.step, &transform, length),
                     });
                 }
                 from = to;
@@ -97,29 +98,34 @@ fn windows(runs: &[Recording]) -> (Vec<Window>, f64) {
     (out, length)
 }
 
+/// The Fourier transform of so many readings. The library's own choice among its algorithms is quicker and compiles all
+/// of them, which took a third of what this crate takes to compile.
+fn transform(readings: usize) -> BluesteinsAlgorithm<f64> {
+    let inner = Radix4::new((2 * readings).next_power_of_two(), FftDirection::Forward);
+    BluesteinsAlgorithm::new(readings, Arc::new(inner))
+}
+
 /// Power of a window's readings, each at its own time: what was dropped leaves a hole.
 fn spectrum(
     time: &[f64],
     rough: &[f64],
     step: f64,
-    planner: &mut RealFftPlanner<f64>,
+    transform: &dyn Fft<f64>,
     length: f64,
-) -> Option<Vec<f64>> {
-    let plan = planner.plan_fft_forward(((length / step).round() as usize).max(8));
-    let mut input = plan.make_input_vec();
+) -> Vec<f64> {
+    let mut readings = vec![Complex::default(); transform.len()];
     let mut weights = 0.0;
     for (t, x) in time.iter().zip(rough) {
         let since = t - time[0];
         let weight = 0.5 - 0.5 * (core::f64::consts::TAU * since / length).cos();
-        if let Some(place) = input.get_mut((since / step).round() as usize) {
-            *place = weight * x;
+        if let Some(place) = readings.get_mut((since / step).round() as usize) {
+            *place = Complex::from(weight * x);
             weights += weight;
         }
     }
-    let mut out = plan.make_output_vec();
-    plan.process(&mut input, &mut out).ok()?;
-    let power = out.iter().map(|c| c.norm_sqr() / (weights * weights));
-    Some(power.collect())
+    transform.process(&mut readings);
+    let lines = readings.iter().take(readings.len() / 2 + 1);
+    lines.map(|c| c.norm_sqr() / (weights * weights)).collect()
 }
 
 /// Median of a spectrum around a line, beside it.
