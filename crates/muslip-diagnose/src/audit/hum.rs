@@ -73,6 +73,10 @@ fn windows(runs: &[Recording]) -> (Vec<Window>, f64) {
     let length = spans[spans.len() / 4].min(HUM_WINDOW_S);
     let mut out = Vec::new();
     for (run, own) in runs.iter().zip(pieces) {
+        // Such a run may have no step, either.
+        if own.is_empty() {
+            continue;
+        }
         let angle = angle(run);
         let transform = transform(((length / run.step).round() as usize).max(8));
         for (start, end) in own {
