@@ -39,6 +39,20 @@ pub struct Decision {
     pub seen: Vec<Seen>,
 }
 
+impl Decision {
+    /// The same without these names.
+    #[must_use]
+    pub fn without(mut self, data: &Data, names: &[usize]) -> Self {
+        let mut model = self.chosen.model.clone();
+        model.terms.retain(|term| !names.contains(&term.entry));
+        if model.terms.len() < self.chosen.model.terms.len() {
+            let fewer = again(data, &model, &self.chosen.extra, &self.chosen);
+            self.chosen = fewer.unwrap_or(self.chosen);
+        }
+        self
+    }
+}
+
 /// What is left beside a model: the free dependence that gains most where the noise is no larger than the sensors make
 /// plausible.
 pub struct Left {

@@ -9,7 +9,7 @@ use crate::data::Data;
 use crate::decide::{Decision, decide};
 use crate::innovations::hypothesis::Judged;
 use crate::innovations::noise::BalanceParts;
-use crate::mechanism::Balance;
+use crate::mechanism::{Balance, Id};
 use crate::model::TYRE_BASE;
 use crate::number::finite_or_zero;
 use crate::split::Split;
@@ -26,32 +26,47 @@ pub(super) struct Given<'a> {
 /// What the argument came to, made without what is kept.
 pub(super) struct Answer<'a> {
     pub(super) given: &'a Given<'a>,
-    pub(super) kept: &'a Split,
+    pub(super) kept: Split,
     pub(super) audit: &'a Audit,
     pub(super) data: Data,
     pub(super) timing: Timing,
+    /// What unseen runs refuted before: it was not asked for.
+    pub(super) refuted: Vec<Id>,
     pub(super) decision: Decision,
 }
 
 impl<'a> Answer<'a> {
-    /// The argument; `None` where nothing usable is left.
+    /// The argument with none of the names that were refuted; `None` where nothing usable is left.
     pub(super) fn of(
         given: &'a Given<'a>,
-        kept: &'a Split,
+        kept: &Split,
         audit: &'a Audit,
         timing: Option<&Timing>,
+        refuted: Vec<Id>,
     ) -> Option<Self> {
         let (data, timing, base) = timed(given.rig, given.runs, audit, kept, timing)?;
         // Delays of the speeds are the chain's: they are named by what the timing shows.
-        let decision = decide(&data, base, &data.catalogue.delays(), timing.untold());
-        Some(Self {
+        let mut excluded = data.catalogue.delays();
+        excluded.extend_from_slice(&refuted);
+        let decision = decide(&data, base, &excluded, timing.untold());
+        let mut answer = Self {
             given,
-            kept,
+            kept: kept.clone(),
             audit,
             data,
             timing,
+            refuted,
             decision,
-        })
+        };
+        let unlikely = answer.unlikely();
+        answer.decision = answer.decision.without(&answer.data, &unlikely);
+        Some(answer)
+    }
+
+    /// Whether it says that nothing is missing.
+    pub(super) fn found_nothing(&self) -> bool {
+        let chosen = &self.decision.chosen;
+        chosen.model.terms.is_empty() && chosen.extra.is_empty() && self.named_delays().is_empty()
     }
 
     /// Covariance in the order of the model's whole vector.

@@ -5,32 +5,27 @@ mod figures;
 mod located;
 mod model_out;
 mod named;
+mod proven;
 
 use std::collections::BTreeMap;
 
-use self::answer::{Answer, Given};
-use self::figures::{fit_of, traces};
-use self::model_out::Predicts;
+use self::answer::Given;
+use self::proven::Proven;
 use crate::audit::{Audit, audit};
 use crate::campaign::{Rig, Run};
 use crate::constants::LEAST_OF_TYRE;
 use crate::data::Data;
 use crate::looked::looked_for;
-use crate::mechanism::{Balance, Id};
+use crate::mechanism::Id;
 use crate::model::Model;
 use crate::number::finite_or_zero;
-use crate::outcome::{
-    Diagnosis, Fault, Fit, NamedMechanism, Recording, Role, ValueAndStd, Verdict,
-};
-use crate::repaired::{Predicting, Repaired};
+use crate::outcome::{Diagnosis, Fault, Fit, Recording, Role, ValueAndStd, Verdict};
+use crate::repaired::Repaired;
 use crate::series::Series;
 use crate::split::Split;
 
 /// Called with the share of the work done (0..=1) and what is being done.
 pub type Progress<'a> = &'a (dyn Fn(f64, &str) + Sync);
-
-/// Most confidence in what unseen runs do not bear out.
-const DOUBTED: f64 = 0.5;
 
 /// Samples above which neighbours are averaged first: memory and time would grow without telling more of anything
 /// but the fastest effects.
@@ -59,25 +54,25 @@ pub fn diagnose(rig: &Rig, runs: Vec<Run>, progress: Progress<'_>) -> Diagnosis 
         averaged,
     };
     progress(0.2, "weighing mechanisms");
-    let nothing_kept = Split::default();
-    let Some(answer) = Answer::of(&given, &nothing_kept, &audit, None) else {
+    let Some(mut proven) = Proven::of(&given, &audit, Vec::new(), progress) else {
         return given.undecided(audit);
     };
-    progress(0.6, "the same again without what is kept for the proof");
-    let kept = Split::new(&given.data);
-    let proof = if answer.found_nothing() {
-        let law = given.plain_law(&kept);
-        Predicting {
-            base_alone: law.clone(),
-            base: law,
-            ..Predicting::default()
+    // Asked again without what unseen runs refute: each time with fewer names to choose from.
+    loop {
+        let mut refuted = proven.refuted();
+        if refuted.is_empty() {
+            break;
         }
-    } else {
-        let again = Answer::of(&given, &kept, &audit, Some(&answer.timing));
-        again.map_or_else(Predicting::default, |again| again.repaired().predicting())
-    };
+        refuted.extend_from_slice(&proven.answer.refuted);
+        progress(0.2, "the same without what unseen runs refute");
+        let Some(mut again) = Proven::of(&given, &audit, refuted, progress) else {
+            break;
+        };
+        again.answer.decision.seen = proven.answer.decision.seen;
+        proven = again;
+    }
     progress(0.9, "report");
-    let diagnosis = answer.assemble(&kept, proof);
+    let diagnosis = proven.assemble();
     progress(1.0, "done");
     diagnosis
 }
@@ -176,93 +171,5 @@ impl Given<'_> {
             });
         }
         faults
-    }
-}
-
-impl Answer<'_> {
-    fn found_nothing(&self) -> bool {
-        let chosen = &self.decision.chosen;
-        chosen.model.terms.is_empty() && chosen.extra.is_empty() && self.named_delays().is_empty()
-    }
-
-    /// What works through the force is not sure where the force is not predicted any better.
-    fn doubt(&self, mechanisms: &mut [NamedMechanism]) {
-        for named in mechanisms.iter_mut() {
-            let id = Id::parse(named.id);
-            let mechanism = id.and_then(|id| self.data.catalogue.of(id));
-            if mechanism.is_some_and(|m| m.facts().through_force) {
-                named.evidence.confidence = named.evidence.confidence.min(DOUBTED);
-            }
-        }
-    }
-
-    /// The diagnosis, proven by what the argument came to without what was kept for that.
-    fn assemble(&self, kept: &Split, proof: Predicting) -> Diagnosis {
-        let mut mechanisms = self.mechanisms();
-        let mut found = self.repaired();
-        found.proof = proof;
-        found.proof_by_blocks = kept.by_block;
-        for (run, recording) in found.recordings.iter_mut().enumerate() {
-            recording.holdout = kept.keeps_whole(run);
-        }
-        // Where the tyre's balance cannot be formed there is no prediction to prove.
-        let predicted = if self.data.forms(Balance::Tyre) {
-            let by_proof = found.unseeing().predicted(self.given.runs);
-            by_proof.unwrap_or_default()
-        } else {
-            Vec::new()
-        };
-        found.set_noise(&predicted);
-        let fit = fit_of(&found, &predicted);
-        // A model that says nothing of the drag predicts it as the base does.
-        let says_something =
-            !found.tyre.is_empty() || !found.corrections.is_empty() || !found.late.is_none();
-        let base_alone = found.without_findings();
-        let worse = fit.holdout.after.rmse_n > fit.holdout.before.rmse_n;
-        let predicts = if says_something && !worse {
-            self.predicts(&base_alone, &found)
-        } else {
-            Predicts::default()
-        };
-        if says_something && !predicts.known {
-            self.doubt(&mut mechanisms);
-        }
-        // What is no likelier than not, or not borne out by unseen runs, is not the strongest, whatever it gained.
-        mechanisms.sort_by_key(|named| named.evidence.confidence <= DOUBTED);
-        let unexplained = self.unexplained();
-        let verdict = match (mechanisms.is_empty(), unexplained.is_empty()) {
-            (true, true) => Verdict::Consistent,
-            (false, true) => Verdict::Explained,
-            (false, false) => Verdict::PartlyExplained,
-            (true, false) => Verdict::Unexplained,
-        };
-        let (r#where, regions) = if mechanisms.is_empty() && unexplained.is_empty() {
-            (Vec::new(), Vec::new())
-        } else {
-            self.located(found.noise.sigma_n)
-        };
-        Diagnosis {
-            schema: "muslip.diagnosis/1",
-            verdict,
-            recordings: self.given.recordings(kept),
-            noise: self.noise(),
-            base: self.base(),
-            r#where,
-            regions,
-            mechanisms,
-            unexplained,
-            looked_for: self.looked_for(),
-            data_faults: self.given.faults(kept),
-            chain: self.audit.chain(),
-            fit,
-            caveats: self.caveats(kept),
-            traces: traces(kept, &predicted, self.data.context.radius),
-            repaired: if predicts.unseen {
-                found.clone()
-            } else {
-                base_alone
-            },
-            found,
-        }
     }
 }

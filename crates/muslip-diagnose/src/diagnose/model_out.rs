@@ -40,7 +40,7 @@ impl Answer<'_> {
             averaged: self.given.averaged,
             rig: data.rig.clone(),
             late,
-            base_alone: self.given.plain_law(self.kept),
+            base_alone: self.given.plain_law(&self.kept),
             base: self.predicting_base(&chosen.model),
             base_unplaced: if unplaced.terms.len() < chosen.model.terms.len() {
                 self.predicting_base(&unplaced)

@@ -17,6 +17,12 @@ use crate::outcome::{
 };
 use crate::separating::separating_test;
 
+/// Least confidence of a name that is said.
+const LEAST_CONFIDENCE: f64 = 0.45;
+
+/// Share of a name's own from which nothing tells an alias from it.
+const TIED: f64 = 0.99;
+
 /// Smallest delay in s that is named where the timing is as sure as this.
 pub(super) fn least_delay(late: &Timing) -> f64 {
     (FORM_OF_DELAY_S + SURE_DELAY * late.std.max(1e-4)).max(LEAST_DELAY_S)
@@ -43,15 +49,11 @@ impl Answer<'_> {
             .filter_map(|(place, term)| {
                 let mechanism = self.data.catalogue.get(term.entry);
                 let id = mechanism.id();
-                let (trial, round) = self.decision.rounds.iter().rev().find_map(|round| {
-                    round
-                        .iter()
-                        .find(|t| t.mechanism().is_some_and(|m| m.1 == term.entry))
-                        .map(|t| (t, round))
-                })?;
+                let (trial, round) = self.taken_up(term.entry)?;
                 let reported = figures(&self.data, &chosen.model, &covariance, place);
                 let values: Vec<Reported<f64>> = reported.iter().map(|(r, _)| r.clone()).collect();
-                let (confidence, others) = confidence(trial, round, self.data.series.len());
+                let (share, others) = shares(trial, round);
+                let confidence = confidence(share, trial, self.data.series.len());
                 let samples: usize = self.data.series.iter().map(|s| s.len()).sum();
                 Some(NamedMechanism {
                     id: id.as_str(),
@@ -81,6 +83,27 @@ impl Answer<'_> {
                 })
             })
             .collect()
+    }
+
+    /// The trial by which a name was taken up, and its round.
+    fn taken_up(&self, entry: usize) -> Option<(&Trial, &[Trial])> {
+        let of_entry = |t: &&Trial| t.mechanism().is_some_and(|m| m.1 == entry);
+        let mut rounds = self.decision.rounds.iter().rev();
+        rounds.find_map(|round| Some((round.iter().find(of_entry)?, round.as_slice())))
+    }
+
+    /// Entries of the names that are too unlikely to be said.
+    pub(super) fn unlikely(&self) -> Vec<usize> {
+        let runs = self.data.series.len();
+        let said = |entry: usize| {
+            self.taken_up(entry).is_none_or(|(trial, round)| {
+                let (share, others) = shares(trial, round);
+                let id = self.data.catalogue.get(entry).id();
+                likely(id, share, &others, confidence(share, trial, runs))
+            })
+        };
+        let terms = self.decision.chosen.model.terms.iter();
+        terms.map(|t| t.entry).filter(|e| !said(*e)).collect()
     }
 
     /// What no name accounts for: dependences of the chosen model, and the one that is left beside it.
@@ -172,8 +195,8 @@ fn surest(runs: usize) -> f64 {
     1.0 - 0.5f64.powf(1.0 + 0.75 * runs as f64)
 }
 
-/// How sure a name is: against the other finalists of its round, against none, and by what so many runs can show.
-fn confidence(trial: &Trial, round: &[Trial], runs: usize) -> (f64, Vec<Alternative>) {
+/// Share of the likelihood that a name has among the other finalists of its round and none, and theirs.
+fn shares(trial: &Trial, round: &[Trial]) -> (f64, Vec<Alternative>) {
     let softness = softness(trial.weight());
     // What predicts the drag worse is less likely however much it gains, for the chain's nuisances may do its work.
     let worse = |t: &Trial| {
@@ -202,7 +225,6 @@ fn confidence(trial: &Trial, round: &[Trial], runs: usize) -> (f64, Vec<Alternat
     }
     let none = (-(trial.weight() / softness)).exp();
     let total = by_id.values().sum::<f64>() + none + outside;
-    let steady = 1.0 - (-0.8 * (trial.steadiness() - 0.5)).exp();
     let own_share = own.and_then(|id| by_id.get(&id).copied()).unwrap_or(1.0) / total;
     let mut others: Vec<Alternative> = by_id
         .iter()
@@ -214,8 +236,20 @@ fn confidence(trial: &Trial, round: &[Trial], runs: usize) -> (f64, Vec<Alternat
         .filter(|a| a.confidence > 0.01)
         .collect();
     others.sort_by(|a, b| b.confidence.total_cmp(&a.confidence));
-    (
-        (own_share * surest(runs) * steady).clamp(0.01, 0.99),
-        others,
-    )
+    (own_share, others)
+}
+
+/// How sure a name with this share is: by what so many runs can show, and how alike they speak for it.
+fn confidence(share: f64, trial: &Trial, runs: usize) -> f64 {
+    let steady = 1.0 - (-0.8 * (trial.steadiness() - 0.5)).exp();
+    (share * surest(runs) * steady).clamp(0.01, 0.99)
+}
+
+/// Whether a name is likely enough to be said: alone, or together with what nothing in the recordings tells it from.
+fn likely(id: Id, share: f64, others: &[Alternative], confidence: f64) -> bool {
+    let alike = |other: &Alternative| {
+        let aliases = || id.aliases().iter().any(|a| a.with.as_str() == other.id);
+        other.confidence > TIED * share && aliases()
+    };
+    confidence > LEAST_CONFIDENCE || others.iter().any(alike)
 }
