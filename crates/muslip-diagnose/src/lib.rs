@@ -49,6 +49,7 @@ mod noise;
 pub mod number;
 pub mod outcome;
 pub mod prepare;
+pub mod progress;
 pub mod proof;
 pub mod repaired;
 mod separating;

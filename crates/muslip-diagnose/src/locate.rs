@@ -80,13 +80,15 @@ const BINS: usize = 40;
 const SHARE: f64 = 0.8;
 
 /// Regions of operation that hold most of the difference: for each variable the shortest range with four fifths
-/// of its energy, the most concentrated first.
+/// of its energy, the most concentrated first. Of the recorded columns those that the model reads: beside any other the
+/// difference is concentrated by chance.
 #[must_use]
 pub fn regions(
     data: &Data,
     balance: &'static str,
     difference: &[Vec<f64>],
     usable: &[Vec<Range<usize>>],
+    columns: &[Variable],
     sigma: f64,
 ) -> Vec<Region> {
     let mut found: Vec<(f64, Region)> = Vec::new();
@@ -100,7 +102,7 @@ pub fn regions(
         Variable::SlipRate,
     ]
     .into_iter()
-    .chain((0..data.extra_names.len()).map(Variable::Column));
+    .chain(columns.iter().cloned());
     for variable in variables {
         let mut samples = energies(data, &variable, difference, usable);
         let total: f64 = samples.iter().map(|s| s.1).sum();

@@ -6,6 +6,9 @@ use super::constants::{LEAK_COPIES, LEAK_IDLE, LEAK_LEVEL, LEAK_SURE};
 use super::finding::{Finding, Word};
 use crate::campaign::Run;
 
+/// Most samples by which a copy is later or earlier than the drag.
+const MOST_LATE: usize = 10;
+
 fn correlation(pairs: impl Iterator<Item = (f64, f64)> + Clone) -> (f64, f64) {
     let finite = || {
         pairs
@@ -162,29 +165,67 @@ fn components(runs: &[Run], names: Vec<&str>) -> Vec<Finding> {
         .collect()
 }
 
-/// Columns that follow the drag to within a thousandth, or nearly so and copy its noise.
+/// Columns that follow the drag to within a thousandth, or nearly so and copy its noise, at its time or samples off it.
 fn copies(runs: &[Run], names: &[&str]) -> Vec<Finding> {
-    names
-        .iter()
-        .copied()
-        .filter_map(|name| {
-            let both: Vec<(&[f64], &[f64])> = runs
-                .iter()
-                .filter_map(|run| Some((run.drag_force_n.as_slice(), column(run, name)?)))
-                .collect();
-            let (level, count) =
-                correlation(both.iter().flat_map(|(a, b)| a.iter().copied().zip(b.iter().copied())));
-            let (copied, _) = correlation(both.iter().flat_map(|(a, b)| rough(a).zip(rough(b))));
-            let leaks = count > 50.0
-                && (level.abs() > LEAK_SURE || (level.abs() > LEAK_LEVEL && copied.abs() > LEAK_COPIES));
-            leaks.then(|| {
-                let said = format!(
-                    "The column {name} reproduces the drag (correlation {level:.4}, of the noise alone {copied:.2}): it explains nothing."
-                );
-                leak(name, (level, count), said)
-            })
-        })
-        .collect()
+    let of_name = |name: &&str| {
+        let both: Vec<(&[f64], &[f64])> = runs
+            .iter()
+            .filter_map(|run| Some((run.drag_force_n.as_slice(), column(run, name)?)))
+            .collect();
+        let copied = (0..=MOST_LATE)
+            .flat_map(|late| [Copied::new(&both, late, 0), Copied::new(&both, 0, late)])
+            .find(Copied::leaks)?;
+        Some(copied.finding(name))
+    };
+    names.iter().filter_map(of_name).collect()
+}
+
+/// How a column correlates with the drag so many samples off.
+struct Copied {
+    level: f64,
+    count: f64,
+    noise: f64,
+}
+
+impl Copied {
+    /// The column so many samples later than the drag, or earlier.
+    fn new(both: &[(&[f64], &[f64])], late: usize, early: usize) -> Self {
+        let both = both.iter().map(|(drag, column)| {
+            (
+                &drag[early.min(drag.len())..],
+                &column[late.min(column.len())..],
+            )
+        });
+        let levels = both
+            .clone()
+            .flat_map(|(a, b)| a.iter().copied().zip(b.iter().copied()));
+        let (level, count) = correlation(levels);
+        // The rest is not asked of a column that is far from the drag.
+        let noise = if level.abs() > LEAK_LEVEL {
+            correlation(both.flat_map(|(a, b)| rough(a).zip(rough(b)))).0
+        } else {
+            0.0
+        };
+        Self {
+            level,
+            count,
+            noise,
+        }
+    }
+
+    fn leaks(&self) -> bool {
+        let level = self.level.abs();
+        let copied = level > LEAK_LEVEL && self.noise.abs() > LEAK_COPIES;
+        self.count > 50.0 && (level > LEAK_SURE || copied)
+    }
+
+    fn finding(&self, name: &str) -> Finding {
+        let said = format!(
+            "The column {name} reproduces the drag (correlation {:.4}, of the noise alone {:.2}): it explains nothing.",
+            self.level, self.noise
+        );
+        leak(name, (self.level, self.count), said)
+    }
 }
 
 #[cfg(test)]
@@ -204,7 +245,13 @@ mod tests {
             extra: vec![("column".to_owned(), extra)],
             ..Run::default()
         };
-        assert_eq!(leaks(&[run(copy)]).len(), 1);
+        for late in [0, 2, 10] {
+            let mut moved = copy.clone();
+            moved.rotate_right(late);
+            assert_eq!(leaks(&[run(moved.clone())]).len(), 1, "{late} samples late");
+            moved.rotate_left(2 * late);
+            assert_eq!(leaks(&[run(moved)]).len(), 1, "{late} samples early");
+        }
         assert!(leaks(&[run(like)]).is_empty());
         assert!(leaks(&[]).is_empty());
     }

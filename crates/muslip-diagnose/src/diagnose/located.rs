@@ -9,6 +9,7 @@ use crate::mechanism::{Balance, Id};
 use crate::model::Model;
 use crate::outcome::{Interval, Region};
 use crate::series::Series;
+use crate::variable::Variable;
 
 /// Time in s over which a speed's change is an acceleration.
 const MEAN_S: f64 = 0.05;
@@ -46,7 +47,16 @@ impl Answer<'_> {
                 .iter()
                 .map(|s| s.segments(balance).to_vec())
                 .collect();
-            where_regions.extend(regions(data, balance.as_str(), &difference, &usable, sigma));
+            let columns = self.columns_read(balance);
+            let balance = balance.as_str();
+            where_regions.extend(regions(
+                data,
+                balance,
+                &difference,
+                &usable,
+                &columns,
+                sigma,
+            ));
         }
         (found, where_regions)
     }
@@ -59,6 +69,14 @@ impl Answer<'_> {
         let mut terms = chosen.model.terms.iter();
         terms.any(|t| named(catalogue.get(t.entry).id()))
             || chosen.extra.iter().any(|e| e.balance == balance)
+    }
+
+    /// Recorded columns that the chosen model reads in a balance.
+    fn columns_read(&self, balance: Balance) -> Vec<Variable> {
+        let own = self.decision.chosen.extra.iter();
+        own.filter(|e| e.balance == balance && matches!(e.variable, Variable::Column(_)))
+            .map(|e| e.variable.clone())
+            .collect()
     }
 
     /// Channel that shows it.

@@ -20,12 +20,10 @@ use crate::mechanism::Id;
 use crate::model::Model;
 use crate::number::finite_or_zero;
 use crate::outcome::{Diagnosis, Fault, Fit, Recording, Role, ValueAndStd, Verdict};
+use crate::progress::Progress;
 use crate::repaired::Repaired;
 use crate::series::Series;
 use crate::split::Split;
-
-/// Called with the share of the work done (0..=1) and what is being done.
-pub type Progress<'a> = &'a (dyn Fn(f64, &str) + Sync);
 
 /// Samples above which neighbours are averaged first: memory and time would grow without telling more of anything
 /// but the fastest effects.

@@ -1,6 +1,5 @@
 //! An answer beside the same argument made without what is kept for the proof, and the diagnosis put together from both.
 
-use super::Progress;
 use super::answer::{Answer, Given};
 use super::figures::{fit_of, traces};
 use super::model_out::Predicts;
@@ -8,6 +7,7 @@ use crate::audit::Audit;
 use crate::data::Data;
 use crate::mechanism::{Balance, Id};
 use crate::outcome::{Diagnosis, Fit, NamedMechanism, Verdict};
+use crate::progress::Progress;
 use crate::proof::Predicted;
 use crate::repaired::{Predicting, Repaired};
 use crate::split::Split;
