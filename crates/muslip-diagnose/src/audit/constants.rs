@@ -64,6 +64,13 @@ pub const LEAK_SURE: f64 = 0.9995;
 pub const LEAK_LEVEL: f64 = 0.98;
 /// Correlation of the noises from which a column copies it: two sensors' noises have none.
 pub const LEAK_COPIES: f64 = 0.25;
+/// Most samples by which a copy is later or earlier than the drag.
+pub const LEAK_MOST_LATE: usize = 10;
+/// Correlation of two sensors' noises that chance makes at most, times the root of the readings: differences of white noise
+/// have one of 1.5 (1 standard deviation), and several columns and times are looked at.
+pub const LEAK_BY_CHANCE: f64 = 6.0;
+/// Readings that say something of a column, at least.
+pub const LEAK_READINGS: f64 = 50.0;
 /// What columns together leave of the drag may grow so many times without one of them that it had no part in it.
 pub const LEAK_IDLE: f64 = 2.0;
 /// Lowest frequency at which a line is looked for, Hz: brakes are worked at lower ones.

@@ -2,12 +2,11 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::constants::{LEAK_COPIES, LEAK_IDLE, LEAK_LEVEL, LEAK_SURE};
+use super::constants::{
+    LEAK_BY_CHANCE, LEAK_COPIES, LEAK_IDLE, LEAK_LEVEL, LEAK_MOST_LATE, LEAK_READINGS, LEAK_SURE,
+};
 use super::finding::{Finding, Word};
 use crate::campaign::Run;
-
-/// Most samples by which a copy is later or earlier than the drag.
-const MOST_LATE: usize = 10;
 
 fn correlation(pairs: impl Iterator<Item = (f64, f64)> + Clone) -> (f64, f64) {
     let finite = || {
@@ -172,28 +171,33 @@ fn copies(runs: &[Run], names: &[&str]) -> Vec<Finding> {
             .iter()
             .filter_map(|run| Some((run.drag_force_n.as_slice(), column(run, name)?)))
             .collect();
-        let copied = (0..=MOST_LATE)
-            .flat_map(|late| [Copied::new(&both, late, 0), Copied::new(&both, 0, late)])
-            .find(Copied::leaks)?;
+        let most = LEAK_MOST_LATE as isize;
+        let times = (-most..=most).map(|late| Copied::new(&both, late));
+        // Neighbours of the right time copy a part of the noise as well.
+        let copied = times
+            .filter(Copied::leaks)
+            .max_by(|a, b| a.noise.total_cmp(&b.noise))?;
         Some(copied.finding(name))
     };
     names.iter().filter_map(of_name).collect()
 }
 
-/// How a column correlates with the drag so many samples off.
+/// How a column correlates with the drag so many samples before.
 struct Copied {
+    late: isize,
     level: f64,
     count: f64,
+    /// Of the noise alone, in the same sense as the level.
     noise: f64,
 }
 
 impl Copied {
-    /// The column so many samples later than the drag, or earlier.
-    fn new(both: &[(&[f64], &[f64])], late: usize, early: usize) -> Self {
+    fn new(both: &[(&[f64], &[f64])], late: isize) -> Self {
+        let [after, before] = [late.max(0), (-late).max(0)].map(isize::unsigned_abs);
         let both = both.iter().map(|(drag, column)| {
             (
-                &drag[early.min(drag.len())..],
-                &column[late.min(column.len())..],
+                &drag[before.min(drag.len())..],
+                &column[after.min(column.len())..],
             )
         });
         let levels = both
@@ -202,11 +206,12 @@ impl Copied {
         let (level, count) = correlation(levels);
         // The rest is not asked of a column that is far from the drag.
         let noise = if level.abs() > LEAK_LEVEL {
-            correlation(both.flat_map(|(a, b)| rough(a).zip(rough(b)))).0
+            level.signum() * correlation(both.flat_map(|(a, b)| rough(a).zip(rough(b)))).0
         } else {
             0.0
         };
         Self {
+            late,
             level,
             count,
             noise,
@@ -215,13 +220,19 @@ impl Copied {
 
     fn leaks(&self) -> bool {
         let level = self.level.abs();
-        let copied = level > LEAK_LEVEL && self.noise.abs() > LEAK_COPIES;
-        self.count > 50.0 && (level > LEAK_SURE || copied)
+        let by_chance = LEAK_BY_CHANCE / self.count.sqrt();
+        let copied = level > LEAK_LEVEL && self.noise > LEAK_COPIES.max(by_chance);
+        self.count > LEAK_READINGS && (level > LEAK_SURE || copied)
     }
 
     fn finding(&self, name: &str) -> Finding {
+        let off = match self.late {
+            0 => String::new(),
+            late if late > 0 => format!(" {late} samples before"),
+            early => format!(" {} samples after", -early),
+        };
         let said = format!(
-            "The column {name} reproduces the drag (correlation {:.4}, of the noise alone {:.2}): it explains nothing.",
+            "The column {name} reproduces the drag{off} (correlation {:.4}, of the noise alone {:.2}): it explains nothing.",
             self.level, self.noise
         );
         leak(name, (self.level, self.count), said)
@@ -232,28 +243,72 @@ impl Copied {
 mod tests {
     use super::*;
 
+    /// White noise within ±1.
+    fn white(seed: u64) -> impl Iterator<Item = f64> {
+        let mut state = seed;
+        core::iter::repeat_with(move || {
+            state = state
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1_442_695_040_888_963_407);
+            (state >> 40) as f64 / f64::from(1u32 << 23) - 1.0
+        })
+    }
+
+    /// Leaks of a column beside a noisy drag.
+    fn beside(drag: &[f64], column: Vec<f64>) -> Vec<Finding> {
+        leaks(&[Run {
+            time_s: (0..drag.len()).map(|k| k as f64).collect(),
+            drag_force_n: drag.to_vec(),
+            extra: vec![("column".to_owned(), column)],
+            ..Run::default()
+        }])
+    }
+
+    fn slow(k: usize) -> f64 {
+        1000.0 * (k as f64 * 0.02).sin()
+    }
+
     #[test]
-    fn a_copy_of_the_drag_leaks_and_a_mere_likeness_does_not() {
-        let drag: Vec<f64> = (0..500)
-            .map(|k| 1000.0 * (f64::from(k) * 0.02).sin() + f64::from((k * 7919) % 101))
+    fn a_copy_of_the_drag_leaks_at_its_time_and_off_it_and_a_mere_likeness_does_not() {
+        let drag: Vec<f64> = white(1)
+            .take(500)
+            .enumerate()
+            .map(|(k, w)| slow(k) + 50.0 * w)
             .collect();
         let copy: Vec<f64> = drag.iter().map(|d| 0.001 * d + 2.0).collect();
-        let like: Vec<f64> = (0..500).map(|k| (f64::from(k) * 0.021).sin()).collect();
-        let run = |extra: Vec<f64>| Run {
-            time_s: (0..500).map(f64::from).collect(),
-            drag_force_n: drag.clone(),
-            extra: vec![("column".to_owned(), extra)],
-            ..Run::default()
-        };
-        for late in [0, 2, 10] {
+        for late in -10i32..=10 {
             let mut moved = copy.clone();
-            moved.rotate_right(late);
-            assert_eq!(leaks(&[run(moved.clone())]).len(), 1, "{late} samples late");
-            moved.rotate_left(2 * late);
-            assert_eq!(leaks(&[run(moved)]).len(), 1, "{late} samples early");
+            moved.rotate_right(late.rem_euclid(500) as usize);
+            let found = beside(&drag, moved);
+            assert_eq!(found.len(), 1, "{late} samples late");
+            let off = format!("{} samples", late.abs());
+            let said = found.first().map_or("", |f| f.statement.as_str());
+            assert_eq!(said.contains(&off), late != 0, "{said}");
         }
-        assert!(leaks(&[run(like)]).is_empty());
+        let mut far = copy;
+        far.rotate_right(20);
+        assert!(beside(&drag, far).is_empty());
+        let like: Vec<f64> = (0..500).map(|k| (f64::from(k) * 0.021).sin()).collect();
+        assert!(beside(&drag, like).is_empty());
         assert!(leaks(&[]).is_empty());
+    }
+
+    #[test]
+    fn another_sensor_of_the_same_force_is_no_copy_however_short_the_recording() {
+        for readings in [60, 200, 1000] {
+            for seed in 0..200 {
+                let sensor = |seed: u64| -> Vec<f64> {
+                    let noise = white(seed).take(readings).enumerate();
+                    noise.map(|(k, w)| slow(k) + 80.0 * w).collect()
+                };
+                let found = beside(&sensor(2 * seed + 1), sensor(2 * seed + 2));
+                assert!(
+                    found.is_empty(),
+                    "{readings} readings, seed {seed}: {:?}",
+                    found[0].statement
+                );
+            }
+        }
     }
 
     #[test]

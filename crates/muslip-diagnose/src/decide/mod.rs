@@ -40,15 +40,20 @@ pub struct Decision {
 }
 
 impl Decision {
-    /// The same without these names.
+    /// The same without these names, by their entries: those that are left under what noise they leave.
     #[must_use]
     pub fn without(mut self, data: &Data, names: &[usize]) -> Self {
         let mut model = self.chosen.model.clone();
         model.terms.retain(|term| !names.contains(&term.entry));
-        if model.terms.len() < self.chosen.model.terms.len() {
-            let fewer = again(data, &model, &self.chosen.extra, &self.chosen);
-            self.chosen = fewer.unwrap_or(self.chosen);
+        if model.terms.len() == self.chosen.model.terms.len() {
+            return self;
         }
+        let fewer = if model.terms.is_empty() && self.chosen.extra.is_empty() {
+            Some(self.base.clone())
+        } else {
+            again(data, &model, &self.chosen.extra, &self.chosen).map(|own| settled(data, own))
+        };
+        self.chosen = fewer.unwrap_or(self.chosen);
         self
     }
 }

@@ -23,6 +23,14 @@ pub(super) struct Given<'a> {
     pub(super) data: Data,
 }
 
+/// A name that works through the force.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct NameOfForce {
+    pub(super) id: Id,
+    /// Whether it is a memory.
+    pub(super) remembers: bool,
+}
+
 /// What the argument came to, made without what is kept.
 pub(super) struct Answer<'a> {
     pub(super) given: &'a Given<'a>,
@@ -30,24 +38,26 @@ pub(super) struct Answer<'a> {
     pub(super) audit: &'a Audit,
     pub(super) data: Data,
     pub(super) timing: Timing,
-    /// What unseen runs refuted before: it was not asked for.
-    pub(super) refuted: Vec<Id>,
+    /// What unseen runs refuted before.
+    pub(super) not_asked: Vec<Id>,
     pub(super) decision: Decision,
+    /// Names that were too unlikely to be said, and how likely they were.
+    pub(super) unsaid: Vec<(Id, f64)>,
 }
 
 impl<'a> Answer<'a> {
-    /// The argument with none of the names that were refuted; `None` where nothing usable is left.
+    /// The argument with none of the names that are not asked for; `None` where nothing usable is left.
     pub(super) fn of(
         given: &'a Given<'a>,
         kept: &Split,
         audit: &'a Audit,
         timing: Option<&Timing>,
-        refuted: Vec<Id>,
+        not_asked: Vec<Id>,
     ) -> Option<Self> {
         let (data, timing, base) = timed(given.rig, given.runs, audit, kept, timing)?;
         // Delays of the speeds are the chain's: they are named by what the timing shows.
         let mut excluded = data.catalogue.delays();
-        excluded.extend_from_slice(&refuted);
+        excluded.extend_from_slice(&not_asked);
         let decision = decide(&data, base, &excluded, timing.untold());
         let mut answer = Self {
             given,
@@ -55,12 +65,35 @@ impl<'a> Answer<'a> {
             audit,
             data,
             timing,
-            refuted,
+            not_asked,
             decision,
+            unsaid: Vec::new(),
         };
         let unlikely = answer.unlikely();
-        answer.decision = answer.decision.without(&answer.data, &unlikely);
+        let entries: Vec<usize> = unlikely.iter().map(|own| own.0).collect();
+        answer.decision = answer.decision.without(&answer.data, &entries);
+        let catalogue = &answer.data.catalogue;
+        let unsaid = unlikely.into_iter();
+        answer.unsaid = unsaid
+            .map(|(entry, own)| (catalogue.get(entry).id(), own))
+            .collect();
         Some(answer)
+    }
+
+    /// Its names that work through the force.
+    pub(super) fn names_of_force(&self) -> Vec<NameOfForce> {
+        let Data {
+            catalogue, context, ..
+        } = &self.data;
+        let terms = self.decision.chosen.model.terms.iter();
+        terms
+            .map(|term| (term, catalogue.get(term.entry)))
+            .filter(|(_, mechanism)| mechanism.facts().through_force)
+            .map(|(term, mechanism)| NameOfForce {
+                id: mechanism.id(),
+                remembers: mechanism.memory_s(&term.parameters, context).is_some(),
+            })
+            .collect()
     }
 
     /// Whether it says that nothing is missing.

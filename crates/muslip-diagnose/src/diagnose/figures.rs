@@ -113,6 +113,18 @@ impl Answer<'_> {
                 "The recordings are long: means over {averaged} samples were diagnosed, so delays and ringing faster than that could not be seen."
             ));
         }
+        for id in &self.not_asked {
+            caveats.push(format!(
+                "{} was refuted and is not named: with it the recordings kept for the proof are predicted worse than without. What is said of those chose the names, too.",
+                id.as_str()
+            ));
+        }
+        for (id, likely) in &self.unsaid {
+            caveats.push(format!(
+                "{} would fit, but is no likelier than {likely:.2}: it is not named.",
+                id.as_str()
+            ));
+        }
         if kept.by_block {
             caveats.push(
                 "Fewer than four recordings: the proof is by blocks of the same runs.".to_owned(),

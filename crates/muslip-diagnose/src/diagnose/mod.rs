@@ -25,6 +25,9 @@ use crate::repaired::Repaired;
 use crate::series::Series;
 use crate::split::Split;
 
+/// Share of the work that is done when all is decided.
+const DECIDED: f64 = 0.9;
+
 /// Samples above which neighbours are averaged first: memory and time would grow without telling more of anything
 /// but the fastest effects.
 const MOST_SAMPLES: usize = 300_000;
@@ -51,25 +54,39 @@ pub fn diagnose(rig: &Rig, runs: Vec<Run>, progress: Progress<'_>) -> Diagnosis 
         runs: &runs,
         averaged,
     };
-    progress(0.2, "weighing mechanisms");
-    let Some(mut proven) = Proven::of(&given, &audit, Vec::new(), progress) else {
+    // Each time the question is held it takes most of what is left to tell: what is done never falls.
+    let mut done = 0.2;
+    let mut hold = |not_asked: Vec<Id>| {
+        let weighing = if not_asked.is_empty() {
+            "weighing mechanisms"
+        } else {
+            "the same without what unseen runs refute"
+        };
+        progress(done, weighing);
+        let proven = Proven::of(&given, &audit, not_asked, || {
+            let proving = done + 0.5 * (DECIDED - done);
+            progress(proving, "the same again without what is kept for the proof");
+        });
+        done += 0.8 * (DECIDED - done);
+        proven
+    };
+    let Some(mut proven) = hold(Vec::new()) else {
         return given.undecided(audit);
     };
-    // Asked again without what unseen runs refute: each time with fewer names to choose from.
     loop {
-        let mut refuted = proven.refuted();
+        let refuted = proven.refuted();
         if refuted.is_empty() {
             break;
         }
-        refuted.extend_from_slice(&proven.answer.refuted);
-        progress(0.2, "the same without what unseen runs refute");
-        let Some(mut again) = Proven::of(&given, &audit, refuted, progress) else {
-            break;
+        let not_asked = [proven.answer.not_asked, refuted].concat();
+        let seen = proven.answer.decision.seen;
+        let Some(again) = hold(not_asked) else {
+            return given.undecided(audit);
         };
-        again.answer.decision.seen = proven.answer.decision.seen;
         proven = again;
+        proven.answer.decision.seen = seen;
     }
-    progress(0.9, "report");
+    progress(DECIDED, "report");
     let diagnosis = proven.assemble();
     progress(1.0, "done");
     diagnosis

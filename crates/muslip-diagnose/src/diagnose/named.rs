@@ -5,7 +5,8 @@ use std::collections::BTreeMap;
 use super::answer::Answer;
 use crate::audit::Timing;
 use crate::constants::{
-    AUDITED, FORM_OF_DELAY_S, LEAST_DELAY_S, PREDICTED_APART, SURE_DELAY, VAGUE_DELAY_S,
+    AUDITED, FEW_RUNS_SURE, FORM_OF_DELAY_S, LEAST_CONFIDENCE, LEAST_DELAY_S, PREDICTED_APART,
+    SURE_DELAY, TIED, VAGUE_DELAY_S,
 };
 use crate::decide::{Claim, Trial, softness, stands};
 use crate::figures::figures;
@@ -16,12 +17,6 @@ use crate::outcome::{
     Alternative, Evidence, NamedMechanism, ReportedParameter, Unexplained, sentence,
 };
 use crate::separating::separating_test;
-
-/// Least confidence of a name that is said.
-const LEAST_CONFIDENCE: f64 = 0.45;
-
-/// Share of a name's own from which nothing tells an alias from it.
-const TIED: f64 = 0.99;
 
 /// Smallest delay in s that is named where the timing is as sure as this.
 pub(super) fn least_delay(late: &Timing) -> f64 {
@@ -53,7 +48,7 @@ impl Answer<'_> {
                 let reported = figures(&self.data, &chosen.model, &covariance, place);
                 let values: Vec<Reported<f64>> = reported.iter().map(|(r, _)| r.clone()).collect();
                 let (share, others) = shares(trial, round);
-                let confidence = confidence(share, trial, self.data.series.len());
+                let confidence = confidence(share, trial.steadiness(), self.data.series.len());
                 let samples: usize = self.data.series.iter().map(|s| s.len()).sum();
                 Some(NamedMechanism {
                     id: id.as_str(),
@@ -92,18 +87,25 @@ impl Answer<'_> {
         rounds.find_map(|round| Some((round.iter().find(of_entry)?, round.as_slice())))
     }
 
-    /// Entries of the names that are too unlikely to be said.
-    pub(super) fn unlikely(&self) -> Vec<usize> {
+    /// Entries of the names that are too unlikely to be said, and how likely they are. Few recordings make no name likely:
+    /// there each is said.
+    pub(super) fn unlikely(&self) -> Vec<(usize, f64)> {
         let runs = self.data.series.len();
-        let said = |entry: usize| {
-            self.taken_up(entry).is_none_or(|(trial, round)| {
-                let (share, others) = shares(trial, round);
-                let id = self.data.catalogue.get(entry).id();
-                likely(id, share, &others, confidence(share, trial, runs))
-            })
-        };
+        if surest(runs) < FEW_RUNS_SURE {
+            return Vec::new();
+        }
         let terms = self.decision.chosen.model.terms.iter();
-        terms.map(|t| t.entry).filter(|e| !said(*e)).collect()
+        let unlikely = terms.filter_map(|term| {
+            let (trial, round) = self.taken_up(term.entry)?;
+            let (share, others) = shares(trial, round);
+            let aliases = self.data.catalogue.get(term.entry).id().aliases();
+            let of_alias =
+                |other: &&Alternative| aliases.iter().any(|a| a.with.as_str() == other.id);
+            let tied = tied(share, others.iter().filter(of_alias).map(|o| o.confidence));
+            let own = confidence(share, trial.steadiness(), runs);
+            (!likely(own, tied / share.max(1e-9))).then_some((term.entry, own))
+        });
+        unlikely.collect()
     }
 
     /// What no name accounts for: dependences of the chosen model, and the one that is left beside it.
@@ -240,16 +242,45 @@ fn shares(trial: &Trial, round: &[Trial]) -> (f64, Vec<Alternative>) {
 }
 
 /// How sure a name with this share is: by what so many runs can show, and how alike they speak for it.
-fn confidence(share: f64, trial: &Trial, runs: usize) -> f64 {
-    let steady = 1.0 - (-0.8 * (trial.steadiness() - 0.5)).exp();
+fn confidence(share: f64, steadiness: f64, runs: usize) -> f64 {
+    let steady = 1.0 - (-0.8 * (steadiness - 0.5)).exp();
     (share * surest(runs) * steady).clamp(0.01, 0.99)
 }
 
-/// Whether a name is likely enough to be said: alone, or together with what nothing in the recordings tells it from.
-fn likely(id: Id, share: f64, others: &[Alternative], confidence: f64) -> bool {
-    let alike = |other: &Alternative| {
-        let aliases = || id.aliases().iter().any(|a| a.with.as_str() == other.id);
-        other.confidence > TIED * share && aliases()
-    };
-    confidence > LEAST_CONFIDENCE || others.iter().any(alike)
+/// Shares of the aliases that nothing in the recordings tells from a name with this one.
+fn tied(share: f64, aliases: impl Iterator<Item = f64>) -> f64 {
+    aliases.filter(|alias| *alias > TIED * share).sum()
+}
+
+/// Whether a name is likely enough to be said together with its aliases, whose shares are so many times its own.
+fn likely(confidence: f64, tied: f64) -> bool {
+    confidence * (1.0 + tied) > LEAST_CONFIDENCE
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn one_run_makes_no_name_surer_than_seven_tenths_and_uneven_runs_make_less() {
+        // 1 - 2^-1.75, and half of it at a t at which half is left.
+        let even = 1e3;
+        assert!((confidence(1.0, even, 1) - 0.702_698).abs() < 1e-6);
+        let half = 0.5 + core::f64::consts::LN_2 / 0.8;
+        assert!((confidence(1.0, half, 1) - 0.351_349).abs() < 1e-6);
+        assert!((confidence(0.5, even, 1) - 0.351_349).abs() < 1e-6);
+        assert!((confidence(1.0, 0.0, 9) - 0.01).abs() < 1e-12, "clamped");
+    }
+
+    #[test]
+    fn a_name_is_said_alone_or_with_an_alias_that_nothing_tells_from_it() {
+        assert!(likely(0.46, 0.0) && !likely(0.44, 0.0));
+        let share = 0.4;
+        let with = |alias: f64| likely(0.3, tied(share, [alias].into_iter()) / share);
+        assert!(with(0.4) && !with(0.39));
+        assert!(
+            !likely(0.05, 1.0),
+            "two unlikely ones are unlikely together"
+        );
+    }
 }

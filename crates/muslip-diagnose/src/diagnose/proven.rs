@@ -1,41 +1,40 @@
 //! An answer beside the same argument made without what is kept for the proof, and the diagnosis put together from both.
 
-use super::answer::{Answer, Given};
+use super::answer::{Answer, Given, NameOfForce};
 use super::figures::{fit_of, traces};
 use super::model_out::Predicts;
 use crate::audit::Audit;
-use crate::data::Data;
+use crate::constants::DOUBTED;
 use crate::mechanism::{Balance, Id};
 use crate::outcome::{Diagnosis, Fit, NamedMechanism, Verdict};
-use crate::progress::Progress;
 use crate::proof::Predicted;
 use crate::repaired::{Predicting, Repaired};
 use crate::split::Split;
-
-/// Most confidence in what unseen runs do not bear out.
-const DOUBTED: f64 = 0.5;
 
 /// What the argument came to, and how the model that it comes to without what is kept predicts that.
 pub(super) struct Proven<'a> {
     pub(super) answer: Answer<'a>,
     kept: Split,
+    /// What the argument without what is kept names.
+    again: Vec<NameOfForce>,
     found: Repaired,
     predicted: Vec<Predicted>,
     fit: Fit,
 }
 
 impl<'a> Proven<'a> {
-    /// The argument with none of these names, and its proof; `None` where nothing usable is left.
+    /// The argument with none of the names that are not asked for, and its proof; `None` where nothing usable is left.
     pub(super) fn of(
         given: &'a Given<'a>,
         audit: &'a Audit,
-        refuted: Vec<Id>,
-        progress: Progress<'_>,
+        not_asked: Vec<Id>,
+        proving: impl FnOnce(),
     ) -> Option<Self> {
-        let answer = Answer::of(given, &Split::default(), audit, None, refuted)?;
-        progress(0.6, "the same again without what is kept for the proof");
+        let answer = Answer::of(given, &Split::default(), audit, None, not_asked)?;
+        proving();
         let kept = Split::new(&given.data);
         let mut found = answer.repaired();
+        let mut names = Vec::new();
         found.proof = if answer.found_nothing() {
             let law = given.plain_law(&kept);
             Predicting {
@@ -44,9 +43,12 @@ impl<'a> Proven<'a> {
                 ..Predicting::default()
             }
         } else {
-            let refuted = answer.refuted.clone();
-            let again = Answer::of(given, &kept, audit, Some(&answer.timing), refuted);
-            again.map_or_else(Predicting::default, |again| again.repaired().predicting())
+            let not_asked = answer.not_asked.clone();
+            let again = Answer::of(given, &kept, audit, Some(&answer.timing), not_asked);
+            again.map_or_else(Predicting::default, |again| {
+                names = again.names_of_force();
+                again.repaired().predicting()
+            })
         };
         found.proof_by_blocks = kept.by_block;
         for (run, recording) in found.recordings.iter_mut().enumerate() {
@@ -63,6 +65,7 @@ impl<'a> Proven<'a> {
         Some(Self {
             answer,
             kept,
+            again: names,
             found,
             predicted,
             fit,
@@ -74,20 +77,13 @@ impl<'a> Proven<'a> {
         self.fit.holdout.after.rmse_n > self.fit.holdout.before.rmse_n
     }
 
-    /// Memories of the force that unseen runs speak against: the chain's own kernels do much of what they do, but predict
-    /// nothing.
+    /// Names that the argument without what is kept speaks against.
     pub(super) fn refuted(&self) -> Vec<Id> {
-        let answer = &self.answer;
-        let Data {
-            catalogue, context, ..
-        } = &answer.data;
-        let terms = answer.decision.chosen.model.terms.iter();
-        let memories = terms.filter_map(|term| {
-            let mechanism = catalogue.get(term.entry);
-            mechanism.memory_s(&term.parameters, context)?;
-            mechanism.facts().through_force.then(|| mechanism.id())
-        });
-        memories.filter(|_| self.predicts_worse()).collect()
+        refuted(
+            &self.answer.names_of_force(),
+            &self.again,
+            self.predicts_worse(),
+        )
     }
 
     /// What works through the force is not sure where the force is not predicted any better.
@@ -155,5 +151,65 @@ impl<'a> Proven<'a> {
             },
             found: self.found,
         }
+    }
+}
+
+/// Names that the same argument without what is kept speaks against: a memory where it comes to none at all, or predicts
+/// what is kept worse than the law does, for the chain's own kernels do much of what a memory does; any other where it
+/// does not come to that but to another in its place that is no memory.
+fn refuted(named: &[NameOfForce], again: &[NameOfForce], worse: bool) -> Vec<Id> {
+    let has = |names: &[NameOfForce], id: Id| names.iter().any(|name| name.id == id);
+    let other = |name: &NameOfForce| !name.remembers && !has(named, name.id);
+    let another = again.iter().any(other);
+    let remembers = again.iter().any(|name| name.remembers);
+    let against = |name: &&NameOfForce| {
+        if name.remembers {
+            worse || !remembers
+        } else {
+            another && !has(again, name.id)
+        }
+    };
+    named.iter().filter(against).map(|name| name.id).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const LAG: NameOfForce = NameOfForce {
+        id: Id::ForceLag,
+        remembers: true,
+    };
+    const RELAXATION: NameOfForce = NameOfForce {
+        id: Id::RelaxationLength,
+        remembers: true,
+    };
+    const WEAR: NameOfForce = NameOfForce {
+        id: Id::WearDrift,
+        remembers: false,
+    };
+    const FADE: NameOfForce = NameOfForce {
+        id: Id::ThermalFade,
+        remembers: false,
+    };
+
+    #[test]
+    fn a_memory_has_to_come_out_again_and_to_predict_no_worse() {
+        assert!(refuted(&[LAG], &[LAG], false).is_empty());
+        // Which memory it is is another question.
+        assert!(refuted(&[LAG], &[RELAXATION], false).is_empty());
+        assert_eq!(refuted(&[LAG, WEAR], &[WEAR], false), [Id::ForceLag]);
+        assert_eq!(refuted(&[LAG, WEAR], &[LAG, WEAR], true), [Id::ForceLag]);
+    }
+
+    #[test]
+    fn any_other_name_gives_way_to_what_comes_out_in_its_place() {
+        assert!(refuted(&[WEAR], &[WEAR, FADE], true).is_empty());
+        // Fewer runs may show nothing.
+        assert!(refuted(&[WEAR], &[], true).is_empty());
+        assert!(refuted(&[WEAR, FADE], &[FADE], false).is_empty());
+        assert_eq!(refuted(&[WEAR], &[FADE], false), [Id::WearDrift]);
+        assert!(refuted(&[WEAR], &[LAG], false).is_empty());
+        assert!(refuted(&[], &[FADE], true).is_empty());
     }
 }
