@@ -98,6 +98,11 @@
     deny(clippy::as_conversions, clippy::float_cmp, clippy::indexing_slicing)
 )]
 
+/// The README's example, tested with the others.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;
+
 mod compensator;
 mod config;
 mod delay;

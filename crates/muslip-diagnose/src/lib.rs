@@ -4,6 +4,9 @@
 //! operating region), what physics was left out (a mechanism of the [vocabulary](mechanism::Id), or the variable
 //! that the rest depends on), repairs the model and proves it on data that no parameter and no choice saw.
 //!
+//! `diagnose::diagnose(&rig, runs, &|done, what| {})` takes a [`campaign::Rig`] and [`campaign::Run`]s (columns in s, rad/s, m/s,
+//! N, N m or Pa) and gives an [`outcome::Diagnosis`]. It has no error: what cannot be judged is `undecided`, with its faults.
+//!
 //! The modules are the argument, in its order:
 //!
 //! | step | module |

@@ -1,6 +1,6 @@
 //! Live innovations of a braked wheel's balances: says during a run that its model is wrong. `no_std`.
 //!
-//! A rig believes in a tyre law, a wheel inertia, a mass. Each makes a balance of what is read, and what a balance leaves
+//! A rig believes in a tyre law (the two-parameter one, `muslip::law::Rudd`), a wheel inertia, a mass. Each makes a balance of what is read, and what a balance leaves
 //! is noise with a memory. A Kalman filter whose states are the parts of that noise turns what is left into
 //! innovations: independent and of variance 1 as long as the model is right. Their mean square and their dependence on
 //! the one before then say, with a stated rate of false alarms, that it is not, and of which balance. The crate allocates

@@ -12,7 +12,9 @@
 //! Magic Formula   mu = D sin(C atan(B s - E (B s - atan(B s))))       peak D, where C atan(...) = π/2
 //! ```
 //!
-//! Both are odd in slip. Constructors validate; a law that exists is a usable one.
+//! Both are odd in slip. The Magic Formula has no shifts; D is friction, not force, and slip a ratio, not percent. B > 0,
+//! 0 < C ≤ 2, D > 0, E ≤ 1, and of Burckhardt's c1, c2 > 0, c3 ≥ 0, c1 c2 > c3: else a `LawError`. A law that exists is a
+//! usable one.
 //!
 //! # Symbols
 //!

@@ -18,7 +18,7 @@ pub struct Start {
     pub efficient: bool,
     /// Peak friction, > 0.
     pub peak_friction: f64,
-    /// Critical slip, > 0; the efficient filter takes 0.054 to 0.37.
+    /// Critical slip, > 0; the efficient filter takes 1/64 to 2.
     pub critical_slip: f64,
     /// Standard deviation of the peak friction, > 0; the article's filter alone has one to start from.
     pub peak_friction_std: f64,

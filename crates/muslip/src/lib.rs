@@ -11,10 +11,12 @@
 //! |---|---|
 //! | [`sample`] | from four channels to one point (slip, friction), or why it is none |
 //! | [`filter::efficient`] | the estimator to begin with: batch maximum likelihood in fixed memory; learns the noise's level, leaves out outliers, can forget |
-//! | [`filter::mu_slip`] | the article's two-state extended Kalman filter: a third of the cycles, 24 bytes of state, a covariance to restore |
+//! | [`filter::mu_slip`] | the article's two-state extended Kalman filter: a third of the cycles on average and a bounded worst case, 60 bytes in `f32`; can start from a given covariance |
 //! | [`filter`] | what both offer: [`filter::Estimator`], [`filter::FrictionMeasurement`], [`filter::PeakEstimate`] |
 //! | [`law`] | the two-parameter law [`law::Rudd`], and the trait of every law |
 //! | [`real`] | the scalar: `f32`, `f64`, a dual number in tests |
+//!
+//! After an error ([`sample::SampleError`]: no measurement; [`filter::UpdateError`]: a refused input) the estimate is as before.
 //!
 //! How well the estimators do, and what they cost: docs/estimators.md. In crates of their own: `muslip-laws`
 //! (Burckhardt, Magic Formula), `muslip-quarter-car` (filter and slip control of a braked quarter car),
@@ -126,6 +128,11 @@
         clippy::cast_sign_loss
     )
 )]
+
+/// The README's example, tested with the others.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;
 
 pub mod filter;
 pub mod law;
