@@ -29,6 +29,8 @@ pub(super) struct NameOfForce {
     pub(super) id: Id,
     /// Whether it is a memory.
     pub(super) remembers: bool,
+    /// Its confidence.
+    pub(super) confidence: f64,
 }
 
 /// What the argument came to, made without what is kept.
@@ -92,6 +94,7 @@ impl<'a> Answer<'a> {
             .map(|(term, mechanism)| NameOfForce {
                 id: mechanism.id(),
                 remembers: mechanism.memory_s(&term.parameters, context).is_some(),
+                confidence: self.confidence_of(term.entry),
             })
             .collect()
     }

@@ -87,6 +87,14 @@ impl Answer<'_> {
         rounds.find_map(|round| Some((round.iter().find(of_entry)?, round.as_slice())))
     }
 
+    /// How sure a name is, before its proof.
+    pub(super) fn confidence_of(&self, entry: usize) -> f64 {
+        self.taken_up(entry).map_or(0.0, |(trial, round)| {
+            let runs = self.data.series.len();
+            confidence(shares(trial, round).0, trial.steadiness(), runs)
+        })
+    }
+
     /// Entries of the names that are too unlikely to be said, and how likely they are. Few recordings make no name likely:
     /// there each is said.
     pub(super) fn unlikely(&self) -> Vec<(usize, f64)> {

@@ -4,7 +4,7 @@ use super::answer::{Answer, Given, NameOfForce};
 use super::figures::{fit_of, traces};
 use super::model_out::Predicts;
 use crate::audit::Audit;
-use crate::constants::DOUBTED;
+use crate::constants::{BEYOND_REFUTATION, DOUBTED};
 use crate::mechanism::{Balance, Id};
 use crate::outcome::{Diagnosis, Fit, NamedMechanism, Verdict};
 use crate::proof::Predicted;
@@ -156,18 +156,20 @@ impl<'a> Proven<'a> {
 
 /// Names that the same argument without what is kept speaks against: a memory where it comes to none at all, or predicts
 /// what is kept worse than the law does, for the chain's own kernels do much of what a memory does; any other where it
-/// does not come to that but to another in its place that is no memory.
+/// does not come to that but to another in its place that is no memory. What all recordings together make sure is not
+/// refuted by fewer.
 fn refuted(named: &[NameOfForce], again: &[NameOfForce], worse: bool) -> Vec<Id> {
     let has = |names: &[NameOfForce], id: Id| names.iter().any(|name| name.id == id);
     let other = |name: &NameOfForce| !name.remembers && !has(named, name.id);
     let another = again.iter().any(other);
     let remembers = again.iter().any(|name| name.remembers);
     let against = |name: &&NameOfForce| {
-        if name.remembers {
+        let contradicted = if name.remembers {
             worse || !remembers
         } else {
             another && !has(again, name.id)
-        }
+        };
+        contradicted && name.confidence < BEYOND_REFUTATION
     };
     named.iter().filter(against).map(|name| name.id).collect()
 }
@@ -179,18 +181,22 @@ mod tests {
     const LAG: NameOfForce = NameOfForce {
         id: Id::ForceLag,
         remembers: true,
+        confidence: 0.8,
     };
     const RELAXATION: NameOfForce = NameOfForce {
         id: Id::RelaxationLength,
         remembers: true,
+        confidence: 0.8,
     };
     const WEAR: NameOfForce = NameOfForce {
         id: Id::WearDrift,
         remembers: false,
+        confidence: 0.8,
     };
     const FADE: NameOfForce = NameOfForce {
         id: Id::ThermalFade,
         remembers: false,
+        confidence: 0.8,
     };
 
     #[test]
@@ -200,6 +206,11 @@ mod tests {
         assert!(refuted(&[LAG], &[RELAXATION], false).is_empty());
         assert_eq!(refuted(&[LAG, WEAR], &[WEAR], false), [Id::ForceLag]);
         assert_eq!(refuted(&[LAG, WEAR], &[LAG, WEAR], true), [Id::ForceLag]);
+        let sure = NameOfForce {
+            confidence: 0.98,
+            ..LAG
+        };
+        assert!(refuted(&[sure], &[], true).is_empty());
     }
 
     #[test]
