@@ -1,4 +1,4 @@
-//! Slip, friction and the two-state estimator, sample by sample.
+//! Slip, friction and the estimate of the peak, sample by sample.
 //!
 //! As `muslip estimate` does it: the efficient estimator, on samples compensated by a diagnosed model where the
 //! parameters hold one; the article's filter where that model has a low-pass filter on the force. What the state

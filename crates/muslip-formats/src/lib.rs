@@ -15,8 +15,24 @@
 //! | `parquet` | Parquet | `PAR1` |
 //! | `arrow` | Arrow IPC, which is Feather v2 | `ARROW1` |
 //!
-//! No reader believes a count in a header: what is allocated is bounded by the file's length, or by [`MOST_BYTES`] where it unpacks. What could
-//! not be read is a fault of the source, in words; it is never left out silently.
+//! No reader believes a count in a header: what is allocated is bounded by the file's length, or by [`MOST_BYTES`] where it unpacks; a Parquet
+//! column grows with the rows that are really in its pages. What could not be read is a fault of the source, in words; it is never left
+//! out silently. A panic inside a reader of others becomes a [`FormatError`], in builds that unwind; [`quiet_panics`] silences its message.
+//!
+//! ```no_run
+//! # #[cfg(feature = "mdf")]
+//! # fn main() -> Result<(), muslip_formats::FormatError> {
+//! use muslip_formats::SourceFile;
+//!
+//! let file = SourceFile::open(std::path::Path::new("run.mf4"))?;
+//! for channel in file.channels() {
+//!     println!("{} [{}] {}", channel.name, channel.unit, channel.samples);
+//! }
+//! # Ok(())
+//! # }
+//! # #[cfg(not(feature = "mdf"))]
+//! # fn main() {}
+//! ```
 #![forbid(unsafe_code)]
 
 #[cfg(feature = "arrow")]

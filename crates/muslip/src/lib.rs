@@ -16,7 +16,7 @@
 //! | [`law`] | the two-parameter law [`law::Rudd`], and the trait of every law |
 //! | [`real`] | the scalar: `f32`, `f64`, a dual number in tests |
 //!
-//! After an error ([`sample::SampleError`]: no measurement; [`filter::UpdateError`]: a refused input) the estimate is as before.
+//! After an error ([`sample::SampleError`]: no measurement; [`filter::mu_slip::UpdateError`]: a refused input) the estimate is as before.
 //!
 //! How well the estimators do, and what they cost: docs/estimators.md. In crates of their own: `muslip-laws`
 //! (Burckhardt, Magic Formula), `muslip-quarter-car` (filter and slip control of a braked quarter car),

@@ -4,7 +4,22 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use assert_cmd::Command;
+use serde_json::Value;
 use tempfile::TempDir;
+
+/// What a JSON schema has against a value.
+pub fn complaint(schema: Value, value: &Value) -> Option<String> {
+    const HERE: &str = "memory:///schema.json";
+    let (mut compiler, mut schemas) = (boon::Compiler::new(), boon::Schemas::new());
+    compiler
+        .add_resource(HERE, schema)
+        .expect("the schema is JSON");
+    let schema = compiler
+        .compile(HERE, &mut schemas)
+        .unwrap_or_else(|error| panic!("the schema is one: {error:#}"));
+    let complaint = schemas.validate(value, schema).err();
+    complaint.map(|error| format!("{error:#}"))
+}
 
 /// A rig with a brake and no declared noise.
 pub const RIG: &str = "\

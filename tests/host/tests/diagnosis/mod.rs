@@ -18,6 +18,8 @@ use muslip_diagnose::repaired::{
 };
 use muslip_recordings::rig_file::RigFile;
 
+use crate::common::complaint;
+
 /// A file of the contract as the repository has it.
 pub fn contract(name: &str) -> String {
     let path = Path::new(env!("CARGO_MANIFEST_DIR"))
@@ -43,12 +45,7 @@ pub fn assert_valid(text: &str) {
         .flatten()
     {
         let schema = serde_json::from_str(&schema).expect("the schema is JSON");
-        let validator = jsonschema::validator_for(&schema).expect("the schema is one");
-        let complaints: Vec<String> = validator
-            .iter_errors(&value)
-            .map(|error| format!("{}: {error}", error.instance_path))
-            .collect();
-        assert!(complaints.is_empty(), "{complaints:#?}");
+        assert_eq!(complaint(schema, &value), None);
     }
 }
 
