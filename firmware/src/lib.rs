@@ -6,10 +6,14 @@
 //! | feature | chip | flash word | edges stamped at |
 //! |---|---|---|---|
 //! | `stm32f405` (default) | STM32F405RG, 168 MHz, run unchanged in QEMU | 4 bytes | 84 MHz |
-//! | `stm32g474` | STM32G474RE, 170 MHz | 8 bytes with ECC | 170 MHz |
+//! | `stm32g474` | STM32G474RE, 170 MHz, never run: tables and flash driver on mocks | 8 bytes with ECC | 170 MHz |
 //!
-//! What boards share stands beside the folders: interrupts and main loop ([`mod@registers`] and those for the target), and
-//! what is the same in all STM32 ([`stm32`]). On a host this is a small library of what can be tested there.
+//! What boards share stands beside the folders: set-up tables that are written and read back ([`mod@registers`]), interrupts
+//! and main loop (`run`, for the target), what survives a reset ([`heat`], [`post_mortem`]), and what is the same in all
+//! STM32 ([`stm32`]). On a host this is a small library of what can be tested there.
+//!
+//! `cargo xtask firmware` builds and checks the images, `cargo xtask flash` writes one, `cargo xtask pil` runs one in QEMU.
+//! Nothing has run on silicon, and no safety category is claimed: docs/rig.md, docs/safety.md.
 #![no_std]
 #![cfg_attr(
     not(test),

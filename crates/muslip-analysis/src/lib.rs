@@ -1,9 +1,10 @@
 //! What is asked of the recordings of a braked wheel, for a command, a notebook or a program of one's own.
 //!
-//! [`estimate`] follows the mu-slip curve through one recording, [`campaign`] holds the estimates of many beside
-//! each other, [`channels`] lists what a file holds, [`fit`] puts the law through all points at once, [`property_file`] writes it for simulations, [`records`] makes tables of results, [`diagnose`] finds what a simulation left out and
-//! predicts the drag. Results are plain structures with their JSON and, in [`wording`], their sentences; pages and
-//! plots of them are `muslip_report`'s.
+//! [`estimate`] follows the mu-slip curve through one recording, [`campaign`] holds the estimates of many beside each other,
+//! [`measure`] says which rows count and how they err, [`channels`] lists what a file holds, [`fit`] puts the law through all
+//! points at once, [`property_file`] writes it for simulations, [`records`] makes tables of results, [`diagnose`] finds what a
+//! simulation left out and predicts the drag. Results are plain structures with their JSON and, in [`wording`], their
+//! sentences; pages and plots of them are `muslip_report`'s. Feature `formats` (off): the files of other programs.
 //!
 //! ```
 //! use std::fmt::Write as _;

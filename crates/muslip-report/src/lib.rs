@@ -1,5 +1,5 @@
-//! Pages and plots: figures described without a backend, drawn by uPlot on one self-contained HTML page or as a
-//! document's SVG or PNG.
+//! Pages and plots: figures described without a backend, drawn by uPlot on one self-contained HTML page, by plotters as a
+//! document's SVG, and from that as PNG ([`write_figures`]). It depends on the whole analysis, whose results it draws.
 //!
 //! [`Figure`] says what is to be seen, [`Report`] puts text, tables and figures on a page that needs no
 //! network, [`svg`] draws the same figures for a document, [`text`] breaks words and tables for a terminal. The
