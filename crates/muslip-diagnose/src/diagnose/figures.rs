@@ -113,16 +113,18 @@ impl Answer<'_> {
                 "The recordings are long: means over {averaged} samples were diagnosed, so delays and ringing faster than that could not be seen."
             ));
         }
+        let words = |id: &Id| id.as_str().replace('_', " ");
         for id in &self.not_asked {
             caveats.push(format!(
-                "{} was refuted and is not named: with it the recordings kept for the proof are predicted worse than without. What is said of those chose the names, too.",
-                id.as_str()
+                "Not named: {}. Without the recordings kept for the proof the same argument does not come to it, or predicts those worse with it; so they had a part in this choice.",
+                words(id)
             ));
         }
         for (id, likely) in &self.unsaid {
             caveats.push(format!(
-                "{} would fit, but is no likelier than {likely:.2}: it is not named.",
-                id.as_str()
+                "Not named: {}, which would fit, with a confidence of {:.0} % only.",
+                words(id),
+                100.0 * likely
             ));
         }
         if kept.by_block {

@@ -46,7 +46,7 @@ pub fn summary(diagnosis: &Diagnosis, out: &Path, width: usize) -> Summary {
         Part::new("Chain", 3, chain(diagnosis), width),
         Part::new("Where", 3, places(diagnosis), width),
         Part::new("What", 9 - verdict.len().max(2), findings(diagnosis), width),
-        Part::new("Better", 2, improvement(diagnosis), width),
+        Part::new("Fit", 2, improvement(diagnosis), width),
         Part::new("Next", 2, next(diagnosis), width),
         Part::new("Data", 2, faults(diagnosis), width),
         Part::new("Unseen", 3, unnoticed(diagnosis), width),
