@@ -15,8 +15,8 @@ use crate::split::Split;
 pub(super) struct Proven<'a> {
     pub(super) answer: Answer<'a>,
     kept: Split,
-    /// What the argument without what is kept names.
-    again: Vec<NameOfForce>,
+    /// What the argument without what is kept names; nothing where it could not be held.
+    again: Option<Vec<NameOfForce>>,
     found: Repaired,
     predicted: Vec<Predicted>,
     fit: Fit,
@@ -34,7 +34,7 @@ impl<'a> Proven<'a> {
         proving();
         let kept = Split::new(&given.data);
         let mut found = answer.repaired();
-        let mut names = Vec::new();
+        let mut names = None;
         found.proof = if answer.found_nothing() {
             let law = given.plain_law(&kept);
             Predicting {
@@ -46,7 +46,7 @@ impl<'a> Proven<'a> {
             let not_asked = answer.not_asked.clone();
             let again = Answer::of(given, &kept, audit, Some(&answer.timing), not_asked);
             again.map_or_else(Predicting::default, |again| {
-                names = again.names_of_force();
+                names = Some(again.names_of_force());
                 again.repaired().predicting()
             })
         };
@@ -79,11 +79,11 @@ impl<'a> Proven<'a> {
 
     /// Names that the argument without what is kept speaks against.
     pub(super) fn refuted(&self) -> Vec<Id> {
-        refuted(
-            &self.answer.names_of_force(),
-            &self.again,
-            self.predicts_worse(),
-        )
+        let named = self.answer.names_of_force();
+        let again = self.again.as_deref();
+        again.map_or_else(Vec::new, |again| {
+            refuted(&named, again, self.predicts_worse())
+        })
     }
 
     /// What works through the force is not sure where the force is not predicted any better.
