@@ -65,7 +65,7 @@ pub const LEAK_LEVEL: f64 = 0.98;
 /// Correlation of the noises from which a column copies it: two sensors' noises have none.
 pub const LEAK_COPIES: f64 = 0.25;
 /// Most samples by which a copy is later or earlier than the drag.
-pub const LEAK_MOST_LATE: usize = 10;
+pub const LEAK_MOST_LATE: isize = 10;
 /// Correlation of two sensors' noises that chance makes at most, times the root of the readings: differences of white noise
 /// have one of 1.5 (1 standard deviation), and several columns and times are looked at.
 pub const LEAK_BY_CHANCE: f64 = 6.0;

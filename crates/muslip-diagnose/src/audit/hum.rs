@@ -234,21 +234,19 @@ pub fn hum(runs: &[Recording]) -> Option<Finding> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::toy::white;
     use super::*;
     use crate::campaign::{Rig, Run};
 
     /// Runs whose drag has a line at a frequency of the clock or of the wheel, some readings dropped.
     fn runs(amplitude: f64, phase: impl Fn(f64, f64) -> f64) -> Vec<Recording> {
-        let mut state = 9_u64;
+        let mut white = white(9);
         (0..4_u32)
             .map(|run| {
                 let mut out = Run::default();
                 for k in (0..8000_u32).filter(|k| k % 97 != 5) {
                     let t = f64::from(k) * 1e-3;
-                    state = state
-                        .wrapping_mul(6_364_136_223_846_793_005)
-                        .wrapping_add(1_442_695_040_888_963_407);
-                    let noise = (state >> 11) as f64 / (1_u64 << 53) as f64 - 0.5;
+                    let noise = white.next().unwrap();
                     // A speed that falls from 60 rad/s: angle 60 t - t².
                     let angle = 60.0 * t - t * t;
                     let swing = 500.0 * (1.0 - (1.9 * t + f64::from(run)).cos());

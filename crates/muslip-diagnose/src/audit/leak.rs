@@ -171,8 +171,7 @@ fn copies(runs: &[Run], names: &[&str]) -> Vec<Finding> {
             .iter()
             .filter_map(|run| Some((run.drag_force_n.as_slice(), column(run, name)?)))
             .collect();
-        let most = LEAK_MOST_LATE as isize;
-        let times = (-most..=most).map(|late| Copied::new(&both, late));
+        let times = (-LEAK_MOST_LATE..=LEAK_MOST_LATE).map(|late| Copied::new(&both, late));
         // Neighbours of the right time copy a part of the noise as well.
         let copied = times
             .filter(Copied::leaks)
@@ -241,18 +240,8 @@ impl Copied {
 
 #[cfg(test)]
 mod tests {
+    use super::super::toy::white;
     use super::*;
-
-    /// White noise within ±1.
-    fn white(seed: u64) -> impl Iterator<Item = f64> {
-        let mut state = seed;
-        core::iter::repeat_with(move || {
-            state = state
-                .wrapping_mul(6_364_136_223_846_793_005)
-                .wrapping_add(1_442_695_040_888_963_407);
-            (state >> 40) as f64 / f64::from(1u32 << 23) - 1.0
-        })
-    }
 
     /// Leaks of a column beside a noisy drag.
     fn beside(drag: &[f64], column: Vec<f64>) -> Vec<Finding> {
@@ -273,7 +262,7 @@ mod tests {
         let drag: Vec<f64> = white(1)
             .take(500)
             .enumerate()
-            .map(|(k, w)| slow(k) + 50.0 * w)
+            .map(|(k, w)| slow(k) + 100.0 * w)
             .collect();
         let copy: Vec<f64> = drag.iter().map(|d| 0.001 * d + 2.0).collect();
         for late in -10i32..=10 {
@@ -299,7 +288,7 @@ mod tests {
             for seed in 0..200 {
                 let sensor = |seed: u64| -> Vec<f64> {
                     let noise = white(seed).take(readings).enumerate();
-                    noise.map(|(k, w)| slow(k) + 80.0 * w).collect()
+                    noise.map(|(k, w)| slow(k) + 160.0 * w).collect()
                 };
                 let found = beside(&sensor(2 * seed + 1), sensor(2 * seed + 2));
                 assert!(

@@ -34,6 +34,8 @@ pub mod steps;
 pub mod still;
 pub mod structure;
 pub mod timing;
+#[cfg(test)]
+mod toy;
 pub mod tyre;
 pub mod vehicle;
 pub mod wheel;
@@ -201,6 +203,7 @@ pub fn audit(rig: &Rig, runs: &[Run]) -> Audit {
 
 #[cfg(test)]
 mod tests {
+    use super::toy::white;
     use super::*;
 
     const MASS: f64 = 420.0;
@@ -221,7 +224,7 @@ mod tests {
     /// A coasting vehicle whose slip swings, its speeds read late by so many s.
     fn run(phase: f64, wheel_late: f64, vehicle_late: f64) -> Run {
         let (dt, count) = (1e-3, 8000);
-        let (mut v, mut state) = (30.0, 3u64);
+        let (mut v, mut white) = (30.0, white(3));
         let (mut speed, mut wheel, mut drag) = (Vec::new(), Vec::new(), Vec::new());
         for k in 0..count {
             let t = f64::from(k) * dt;
@@ -233,12 +236,7 @@ mod tests {
             drag.push(force);
             v -= dt * force / MASS * 0.3;
         }
-        let mut noise = |size: f64| {
-            state = state
-                .wrapping_mul(6_364_136_223_846_793_005)
-                .wrapping_add(1_442_695_040_888_963_407);
-            size * ((state >> 11) as f64 / (1u64 << 53) as f64 - 0.5)
-        };
+        let mut noise = |size: f64| size * white.next().unwrap();
         let late =
             |x: &[f64], by: f64, k: i32| x[usize::try_from(k - (by / dt) as i32).unwrap_or(0)];
         let rows = || 0..count;

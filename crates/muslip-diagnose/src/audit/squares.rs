@@ -439,18 +439,15 @@ fn spread(
 
 #[cfg(test)]
 mod tests {
+    use super::super::toy::white;
     use super::*;
 
     #[test]
     fn an_autoregression_is_read_off_its_own_series() {
-        let mut state = 1u64;
         let mut x = 0.0;
-        let series: Vec<f64> = (0..20_000)
-            .map(|_| {
-                state = state
-                    .wrapping_mul(6364136223846793005)
-                    .wrapping_add(1442695040888963407);
-                let u = (state >> 11) as f64 / (1u64 << 53) as f64 - 0.5;
+        let series: Vec<f64> = white(1)
+            .take(20_000)
+            .map(|u| {
                 x = 0.8 * x + u;
                 x
             })

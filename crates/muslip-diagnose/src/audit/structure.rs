@@ -360,29 +360,23 @@ pub fn middle(values: impl Iterator<Item = f64>) -> f64 {
 
 #[cfg(test)]
 mod tests {
+    use super::super::toy::white;
     use super::*;
 
-    fn noise(state: &mut u64) -> f64 {
-        // Sum of four: nearly normal, of variance one.
-        (0..4)
-            .map(|_| {
-                *state = state
-                    .wrapping_mul(6_364_136_223_846_793_005)
-                    .wrapping_add(1_442_695_040_888_963_407);
-                3f64.sqrt() * ((*state >> 11) as f64 / (1u64 << 53) as f64 - 0.5)
-            })
-            .sum()
+    /// Nearly normal, of variance one: the sum of four.
+    fn noise(white: &mut impl Iterator<Item = f64>) -> f64 {
+        white.by_ref().take(4).map(|x| 3f64.sqrt() * x).sum()
     }
 
     fn pair(shared: f64, count: usize) -> Pair {
-        let (mut state, mut x) = (5u64, 0.0);
+        let (mut white, mut x) = (white(5), 0.0);
         let keep = (-0.005f64 / 0.05).exp();
         let fresh = (1.0 - keep * keep).sqrt();
         let (mut a, mut b) = (Vec::new(), Vec::new());
         for k in 0..count {
-            x = keep * x + fresh * noise(&mut state);
-            a.push(shared * x + noise(&mut state) + 0.1 * k as f64);
-            b.push(shared * x + noise(&mut state));
+            x = keep * x + fresh * noise(&mut white);
+            a.push(shared * x + noise(&mut white) + 0.1 * k as f64);
+            b.push(shared * x + noise(&mut white));
         }
         Pair {
             a,

@@ -43,8 +43,8 @@ pub(super) struct Answer<'a> {
     /// What unseen runs refuted before.
     pub(super) not_asked: Vec<Id>,
     pub(super) decision: Decision,
-    /// Names that were too unlikely to be said, and how likely they were.
-    pub(super) unsaid: Vec<(Id, f64)>,
+    /// Entries of names that were too unlikely to be said, and how likely they were.
+    pub(super) unsaid: Vec<(usize, f64)>,
 }
 
 impl<'a> Answer<'a> {
@@ -71,14 +71,9 @@ impl<'a> Answer<'a> {
             decision,
             unsaid: Vec::new(),
         };
-        let unlikely = answer.unlikely();
-        let entries: Vec<usize> = unlikely.iter().map(|own| own.0).collect();
-        answer.decision = answer.decision.without(&answer.data, &entries);
-        let catalogue = &answer.data.catalogue;
-        let unsaid = unlikely.into_iter();
-        answer.unsaid = unsaid
-            .map(|(entry, own)| (catalogue.get(entry).id(), own))
-            .collect();
+        answer.unsaid = answer.unlikely();
+        let unsaid: Vec<usize> = answer.unsaid.iter().map(|own| own.0).collect();
+        answer.decision = answer.decision.without(&answer.data, &unsaid);
         Some(answer)
     }
 
@@ -94,7 +89,9 @@ impl<'a> Answer<'a> {
             .map(|(term, mechanism)| NameOfForce {
                 id: mechanism.id(),
                 remembers: mechanism.memory_s(&term.parameters, context).is_some(),
-                confidence: self.confidence_of(term.entry),
+                confidence: self
+                    .sureness(term.entry)
+                    .map_or(0.0, |own| own.1.confidence),
             })
             .collect()
     }

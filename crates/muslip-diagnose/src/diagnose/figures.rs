@@ -113,17 +113,17 @@ impl Answer<'_> {
                 "The recordings are long: means over {averaged} samples were diagnosed, so delays and ringing faster than that could not be seen."
             ));
         }
-        let words = |id: &Id| id.as_str().replace('_', " ");
-        for id in &self.not_asked {
+        let words = |id: Id| id.as_str().replace('_', " ");
+        for &id in &self.not_asked {
             caveats.push(format!(
                 "Not named: {}. Without the recordings kept for the proof the same argument does not come to it, or predicts those worse with it; so they had a part in this choice.",
                 words(id)
             ));
         }
-        for (id, likely) in &self.unsaid {
+        for &(entry, likely) in &self.unsaid {
             caveats.push(format!(
                 "Not named: {}, which would fit, with a confidence of {:.0} % only.",
-                words(id),
+                words(self.data.catalogue.get(entry).id()),
                 100.0 * likely
             ));
         }

@@ -44,11 +44,9 @@ impl Answer<'_> {
             .filter_map(|(place, term)| {
                 let mechanism = self.data.catalogue.get(term.entry);
                 let id = mechanism.id();
-                let (trial, round) = self.taken_up(term.entry)?;
+                let (trial, sure) = self.sureness(term.entry)?;
                 let reported = figures(&self.data, &chosen.model, &covariance, place);
                 let values: Vec<Reported<f64>> = reported.iter().map(|(r, _)| r.clone()).collect();
-                let (share, others) = shares(trial, round);
-                let confidence = confidence(share, trial.steadiness(), self.data.series.len());
                 let samples: usize = self.data.series.iter().map(|s| s.len()).sum();
                 Some(NamedMechanism {
                     id: id.as_str(),
@@ -64,14 +62,15 @@ impl Answer<'_> {
                         holdout_nll_gain_per_sample: finite_or_zero(
                             trial.unseen.0 * self.data.series.len() as f64 / samples.max(1) as f64,
                         ),
-                        confidence,
+                        confidence: sure.confidence,
                     },
-                    separating_test: others
+                    separating_test: sure
+                        .others
                         .first()
                         .filter(|o| o.confidence > 0.05)
                         .and_then(|o| Id::parse(o.id))
                         .map_or(String::new(), |other| separating_test(id, other).to_owned()),
-                    confusable_with: others,
+                    confusable_with: sure.others,
                     effect_sigma: finite_or_zero(
                         (2.0 * trial.gain.max(0.0) / samples.max(1) as f64).sqrt(),
                     ),
@@ -80,38 +79,36 @@ impl Answer<'_> {
             .collect()
     }
 
-    /// The trial by which a name was taken up, and its round.
-    fn taken_up(&self, entry: usize) -> Option<(&Trial, &[Trial])> {
+    /// The trial by which a name was taken up, and how sure it is before its proof.
+    pub(super) fn sureness(&self, entry: usize) -> Option<(&Trial, Sureness)> {
         let of_entry = |t: &&Trial| t.mechanism().is_some_and(|m| m.1 == entry);
         let mut rounds = self.decision.rounds.iter().rev();
-        rounds.find_map(|round| Some((round.iter().find(of_entry)?, round.as_slice())))
-    }
-
-    /// How sure a name is, before its proof.
-    pub(super) fn confidence_of(&self, entry: usize) -> f64 {
-        self.taken_up(entry).map_or(0.0, |(trial, round)| {
-            let runs = self.data.series.len();
-            confidence(shares(trial, round).0, trial.steadiness(), runs)
-        })
+        let (trial, round) =
+            rounds.find_map(|round| Some((round.iter().find(of_entry)?, round)))?;
+        let (share, others) = shares(trial, round);
+        let sureness = Sureness {
+            share,
+            confidence: confidence(share, trial.steadiness(), self.data.series.len()),
+            others,
+        };
+        Some((trial, sureness))
     }
 
     /// Entries of the names that are too unlikely to be said, and how likely they are. Few recordings make no name likely:
     /// there each is said.
     pub(super) fn unlikely(&self) -> Vec<(usize, f64)> {
-        let runs = self.data.series.len();
-        if surest(runs) < FEW_RUNS_SURE {
+        if surest(self.data.series.len()) < FEW_RUNS_SURE {
             return Vec::new();
         }
         let terms = self.decision.chosen.model.terms.iter();
         let unlikely = terms.filter_map(|term| {
-            let (trial, round) = self.taken_up(term.entry)?;
-            let (share, others) = shares(trial, round);
+            let (_, sure) = self.sureness(term.entry)?;
             let aliases = self.data.catalogue.get(term.entry).id().aliases();
             let of_alias =
                 |other: &&Alternative| aliases.iter().any(|a| a.with.as_str() == other.id);
-            let tied = tied(share, others.iter().filter(of_alias).map(|o| o.confidence));
-            let own = confidence(share, trial.steadiness(), runs);
-            (!likely(own, tied / share.max(1e-9))).then_some((term.entry, own))
+            let aliases = sure.others.iter().filter(of_alias).map(|o| o.confidence);
+            let tied = tied(sure.share, aliases) / sure.share.max(1e-9);
+            (!likely(sure.confidence, tied)).then_some((term.entry, sure.confidence))
         });
         unlikely.collect()
     }
@@ -203,6 +200,16 @@ impl Answer<'_> {
 /// Surest that so many runs can make a name.
 fn surest(runs: usize) -> f64 {
     1.0 - 0.5f64.powf(1.0 + 0.75 * runs as f64)
+}
+
+/// How sure a name is.
+pub(super) struct Sureness {
+    /// Share of the likelihood that it has among the finalists of its round and none.
+    share: f64,
+    /// What is left of that by the number of runs, and by how alike they speak.
+    pub(super) confidence: f64,
+    /// The other finalists with theirs, the likeliest first.
+    others: Vec<Alternative>,
 }
 
 /// Share of the likelihood that a name has among the other finalists of its round and none, and theirs.

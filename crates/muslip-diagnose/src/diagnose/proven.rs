@@ -178,26 +178,18 @@ fn refuted(named: &[NameOfForce], again: &[NameOfForce], worse: bool) -> Vec<Id>
 mod tests {
     use super::*;
 
-    const LAG: NameOfForce = NameOfForce {
-        id: Id::ForceLag,
-        remembers: true,
-        confidence: 0.8,
-    };
-    const RELAXATION: NameOfForce = NameOfForce {
-        id: Id::RelaxationLength,
-        remembers: true,
-        confidence: 0.8,
-    };
-    const WEAR: NameOfForce = NameOfForce {
-        id: Id::WearDrift,
-        remembers: false,
-        confidence: 0.8,
-    };
-    const FADE: NameOfForce = NameOfForce {
-        id: Id::ThermalFade,
-        remembers: false,
-        confidence: 0.8,
-    };
+    const fn name(id: Id, remembers: bool) -> NameOfForce {
+        NameOfForce {
+            id,
+            remembers,
+            confidence: 0.8,
+        }
+    }
+
+    const LAG: NameOfForce = name(Id::ForceLag, true);
+    const RELAXATION: NameOfForce = name(Id::RelaxationLength, true);
+    const WEAR: NameOfForce = name(Id::WearDrift, false);
+    const FADE: NameOfForce = name(Id::ThermalFade, false);
 
     #[test]
     fn a_memory_has_to_come_out_again_and_to_predict_no_worse() {
