@@ -2,6 +2,7 @@
 
 use std::io::{BufRead, BufReader};
 use std::process::{Command, Stdio};
+use std::thread;
 
 use anyhow::{Context, Result, bail};
 
@@ -57,6 +58,9 @@ pub fn run_all() -> Result<()> {
 
     let files = formats::write()?;
 
+    // Downloads and unpacking mostly wait: beside what is built.
+    let environments = thread::spawn(python::environments);
+
     // The long ones too: a test is ignored by `cargo test` because it is long, and for no other reason.
     let mut workspace = cargo(&[
         "test",
@@ -75,6 +79,10 @@ pub fn run_all() -> Result<()> {
         .env(formats::PYTHON, formats::python()?);
     let tally = tests("tests of the workspace", workspace)?;
 
+    let Ok(made) = environments.join() else {
+        bail!("making the Python environments panicked");
+    };
+    made?;
     python::test(&trial::under_test(), python::FEATURES)?;
 
     trial::small()?;
