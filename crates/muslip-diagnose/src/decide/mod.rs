@@ -14,9 +14,9 @@ use crate::chain::timing::Untold;
 use crate::constants::{ALIKE_NATS, DEPENDENCE_NATS, DEPENDENCE_SHARE, FORM_LEFT};
 use crate::data::Data;
 use crate::innovations::dependence::{self, Dependence};
-use crate::innovations::hypothesis::{Guess, Judged, judge};
+use crate::innovations::hypothesis::{Guess, Judged, judge, judge_added};
 use crate::looked::Seen;
-use crate::mechanism::Id;
+use crate::mechanism::{Balance, Id};
 use crate::model::Model;
 
 /// Most names.
@@ -168,7 +168,55 @@ impl Question<'_> {
             trials.extend(screen.trials_without(&tried));
             rank(data, &mut trials);
         }
+        self.hold_beside_chain(&mut trials, taken_up);
         (trials, screen.seen())
+    }
+
+    /// Holds what stands beside a memory of the chain's that gains more in its balance: torque or force that comes late is
+    /// an inertia, too, where nothing else is asked.
+    fn hold_beside_chain(&self, trials: &mut [Trial], taken_up: &TakenUp) {
+        let data = self.data;
+        let memories: Vec<(Trial, &[Balance])> = trials
+            .iter()
+            .filter(|t| !t.outlasts_chain)
+            .filter_map(|t| {
+                let (_, entry) = t.mechanism()?;
+                Some((t.clone(), data.catalogue.get(entry).guide().touches))
+            })
+            .collect();
+        let doubtful = |t: &&mut Trial| t.mechanism().is_some() && !t.remembers && stands(t);
+        for trial in trials.iter_mut().filter(doubtful) {
+            let balance = trial.claim.balance(data);
+            // Best first, as the trials are.
+            let memory = memories.iter().find(|(memory, touches)| {
+                let more = memory.weight() - trial.weight();
+                touches.contains(&balance) && more > softness(memory.weight())
+            });
+            if let Some((memory, _)) = memory {
+                trial.beside_chain = self.stands_beside(trial, memory, taken_up);
+            }
+        }
+    }
+
+    /// Whether a mechanism stands beside another, too.
+    fn stands_beside(&self, trial: &Trial, other: &Trial, taken_up: &TakenUp) -> bool {
+        let data = self.data;
+        let Some((_, entry)) = trial.mechanism() else {
+            return false;
+        };
+        let with_other = settled(data, under_own_noise(data, other.judged.clone()));
+        let before = Before::new(data, &with_other, self.untold, taken_up.at_sensors);
+        let mut model = with_other.model.clone();
+        let own = trial.judged.model.terms.iter().filter(|t| t.entry == entry);
+        model.terms.extend(own.cloned());
+        let both = judge_added(
+            data,
+            &model,
+            &with_other.extra,
+            before.beside(),
+            effort(data),
+        );
+        both.is_some_and(|both| stands(&before.tried(trial.claim.clone(), both, trial.size)))
     }
 }
 

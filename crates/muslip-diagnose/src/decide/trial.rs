@@ -84,6 +84,8 @@ pub struct Trial {
     pub remembers: bool,
     /// Whether its memory is longer than what the chain's own timing was off by, and no longer than the channels show.
     pub outlasts_chain: bool,
+    /// Whether it stands beside a memory of the chain's that gains more in its balance.
+    pub beside_chain: bool,
     /// Readings in the balances that are judged.
     pub readings: usize,
     /// Gain in nats if the noise were no larger than the sensors make plausible: how large the effect is, whatever
@@ -222,7 +224,7 @@ impl<'a> Before<'a> {
             let term = judged.model.terms.iter().find(|t| t.entry == entry)?;
             Some((id, entry, term.parameters.as_slice()))
         });
-        let own = term.is_none_or(|(_, entry, p)| data.catalogue.get(entry).owns(p));
+        let own = term.is_none_or(|(_, entry, p)| data.catalogue.get(entry).owns(p, &data.context));
         let memory_s = term.and_then(|(id, entry, p)| {
             let memory_s = data.catalogue.get(entry).memory_s(p, &data.context)?;
             Some((memory_s, least_memory_s(data, id, entry)))
@@ -259,6 +261,7 @@ impl<'a> Before<'a> {
             remembers: memory_s.is_some(),
             outlasts_chain: memory_s
                 .is_none_or(|(memory, least)| memory > least.max(chain_s) && memory < longest_s),
+            beside_chain: true,
             predicts,
             readings,
             size,
@@ -316,10 +319,12 @@ fn worth(trial: &Trial) -> f64 {
     0.5 * LEAST_EFFECT * LEAST_EFFECT * trial.readings as f64
 }
 
-/// Whether a trial could be named, were it seen: large enough, itself, no memory of the chain's, and better at predicting.
+/// Whether a trial could be named, were it seen: large enough, itself, neither a memory of the chain's nor what one leaves,
+/// and better at predicting.
 fn could_be_named(trial: &Trial) -> bool {
     let large = trial.size > worth(trial);
-    large && trial.own && trial.outlasts_chain && trial.predicts > LEAST_PREDICTED
+    let not_of_chain = trial.outlasts_chain && trial.beside_chain;
+    large && trial.own && not_of_chain && trial.predicts > LEAST_PREDICTED
 }
 
 /// Whether a trial stands.

@@ -24,13 +24,15 @@ pub(super) struct Given<'a> {
 }
 
 /// A name that works through the force.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub(super) struct NameOfForce {
     pub(super) id: Id,
     /// Whether it is a memory.
     pub(super) remembers: bool,
     /// Its confidence.
     pub(super) confidence: f64,
+    /// What is hardly less likely.
+    pub(super) rivals: Vec<Id>,
 }
 
 /// What the argument came to, made without what is kept.
@@ -86,12 +88,14 @@ impl<'a> Answer<'a> {
         terms
             .map(|term| (term, catalogue.get(term.entry)))
             .filter(|(_, mechanism)| mechanism.facts().through_force)
-            .map(|(term, mechanism)| NameOfForce {
-                id: mechanism.id(),
-                remembers: mechanism.memory_s(&term.parameters, context).is_some(),
-                confidence: self
-                    .sureness(term.entry)
-                    .map_or(0.0, |own| own.1.confidence),
+            .map(|(term, mechanism)| {
+                let sure = self.sureness(term.entry).map(|own| own.1);
+                NameOfForce {
+                    id: mechanism.id(),
+                    remembers: mechanism.memory_s(&term.parameters, context).is_some(),
+                    confidence: sure.as_ref().map_or(0.0, |own| own.confidence),
+                    rivals: sure.map_or(Vec::new(), |own| own.rivals()),
+                }
             })
             .collect()
     }

@@ -5,8 +5,8 @@ use std::collections::BTreeMap;
 use super::answer::Answer;
 use crate::audit::Timing;
 use crate::constants::{
-    AUDITED, FEW_RUNS_SURE, FORM_OF_DELAY_S, LEAST_CONFIDENCE, LEAST_DELAY_S, PREDICTED_APART,
-    SURE_DELAY, TIED, VAGUE_DELAY_S,
+    AUDITED, FEW_RUNS_SURE, FORM_OF_DELAY_S, HARDLY_LESS, LEAST_CONFIDENCE, LEAST_DELAY_S,
+    PREDICTED_APART, SURE_DELAY, TIED, VAGUE_DELAY_S,
 };
 use crate::decide::{Claim, Trial, softness, stands};
 use crate::figures::figures;
@@ -210,6 +210,15 @@ pub(super) struct Sureness {
     pub(super) confidence: f64,
     /// The other finalists with theirs, the likeliest first.
     others: Vec<Alternative>,
+}
+
+impl Sureness {
+    /// The others that are hardly less likely.
+    pub(super) fn rivals(&self) -> Vec<Id> {
+        let near = |other: &&Alternative| other.confidence > HARDLY_LESS * self.share;
+        let near = self.others.iter().filter(near);
+        near.filter_map(|other| Id::parse(other.id)).collect()
+    }
 }
 
 /// Share of the likelihood that a name has among the other finalists of its round and none, and theirs.

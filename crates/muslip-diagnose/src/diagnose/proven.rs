@@ -156,18 +156,19 @@ impl<'a> Proven<'a> {
 
 /// Names that the same argument without what is kept speaks against: a memory where it comes to none at all, or predicts
 /// what is kept worse than the law does, for the chain's own kernels do much of what a memory does; any other where it
-/// does not come to that but to another in its place that is no memory. What all recordings together make sure is not
-/// refuted by fewer.
+/// does not come to that, nor to what is hardly likelier than that, but to another in its place that is no memory. What all
+/// recordings together make sure is not refuted by fewer.
 fn refuted(named: &[NameOfForce], again: &[NameOfForce], worse: bool) -> Vec<Id> {
     let has = |names: &[NameOfForce], id: Id| names.iter().any(|name| name.id == id);
     let other = |name: &NameOfForce| !name.remembers && !has(named, name.id);
     let another = again.iter().any(other);
     let remembers = again.iter().any(|name| name.remembers);
+    let rivals = |id: Id| again.iter().any(|name| name.rivals.contains(&id));
     let against = |name: &&NameOfForce| {
         let contradicted = if name.remembers {
             worse || !remembers
         } else {
-            another && !has(again, name.id)
+            another && !has(again, name.id) && !rivals(name.id)
         };
         contradicted && name.confidence < BEYOND_REFUTATION
     };
@@ -183,6 +184,7 @@ mod tests {
             id,
             remembers,
             confidence: 0.8,
+            rivals: Vec::new(),
         }
     }
 
@@ -203,6 +205,15 @@ mod tests {
             ..LAG
         };
         assert!(refuted(&[sure], &[], true).is_empty());
+    }
+
+    #[test]
+    fn what_is_hardly_less_likely_than_what_comes_out_is_not_refuted_by_it() {
+        let rivalled = NameOfForce {
+            rivals: vec![Id::WearDrift],
+            ..FADE
+        };
+        assert!(refuted(&[WEAR], &[rivalled], false).is_empty());
     }
 
     #[test]

@@ -23,6 +23,9 @@ fn heat<T: Number>(time_constant: T, series: &Series, context: &Context) -> Vec<
         .collect()
 }
 
+/// Shortest time constant in s: what cools faster is no brake, and follows the torque as a lag does.
+const SHORTEST_S: f64 = 0.3;
+
 /// Torque per pressure falls with brake temperature.
 pub struct BrakeFade;
 
@@ -40,7 +43,7 @@ impl Describe for BrakeFade {
             Parameter::new(
                 "time_constant",
                 "s",
-                0.3,
+                SHORTEST_S,
                 (20.0 * context.duration).max(10.0),
             ),
         ]
@@ -51,6 +54,9 @@ impl Describe for BrakeFade {
             .filter(|t| **t < 20.0 * search.context.duration)
             .map(|t| vec![0.0, *t])
             .collect()
+    }
+    fn owns(&self, parameters: &[f64], _context: &Context) -> bool {
+        exceeds(parameters[1], SHORTEST_S)
     }
     fn statement(&self, reported: &[Reported<f64>], _p: &[f64]) -> String {
         format!(

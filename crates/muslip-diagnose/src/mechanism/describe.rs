@@ -240,7 +240,7 @@ pub trait Describe: Send + Sync {
         self.facts().fed_by_chain || self.guide().memory == Memory::Kernel
     }
     /// Whether these parameters are its own, and not at a limit where its form is another's.
-    fn owns(&self, _parameters: &[f64]) -> bool {
+    fn owns(&self, _parameters: &[f64], _context: &Context) -> bool {
         true
     }
     /// Whether it goes by the order of the campaign's runs: a recording whose place in it is not known is predicted
@@ -248,6 +248,11 @@ pub trait Describe: Send + Sync {
     fn by_order(&self, _context: &Context) -> bool {
         false
     }
+}
+
+/// Whether a parameter is above its lowest value, and not held there by its limit.
+pub fn exceeds(parameter: f64, lowest: f64) -> bool {
+    parameter > 1.01 * lowest
 }
 
 /// What a mechanism does, in plain or dual numbers.

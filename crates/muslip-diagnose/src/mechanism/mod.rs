@@ -75,7 +75,6 @@ pub fn catalogue<T: Number>() -> Vec<Box<dyn Mechanism<T>>> {
         entry(load_sensitivity::LoadSensitivity {
             with_stiffness: true,
         }),
-        entry(slip_hysteresis::SlipHysteresis),
         entry(rolling_resistance::RollingResistance { growing: false }),
         entry(rolling_resistance::RollingResistance { growing: true }),
         entry(surface_patch::SurfacePatch { patches: 1 }),
@@ -103,6 +102,7 @@ pub fn catalogue<T: Number>() -> Vec<Box<dyn Mechanism<T>>> {
     all.extend(
         relaxation_length::FORMS.map(|form| entry(relaxation_length::RelaxationLength { form })),
     );
+    all.extend(slip_hysteresis::FORMS.map(|form| entry(slip_hysteresis::SlipHysteresis { form })));
     all.extend(
         effective_radius::FORMS.map(|form| entry(effective_radius::EffectiveRadius { form })),
     );

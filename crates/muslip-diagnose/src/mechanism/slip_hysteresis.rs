@@ -2,25 +2,81 @@
 
 use super::prelude::*;
 
+/// Along what the two curves lie apart.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Form {
+    /// Friction: by a share of it, on either side of their mean.
+    Friction,
+    /// Slip: the patch feels a slip that follows the wheel's with a play, and nothing where the curve is level.
+    Slip,
+}
+
+/// Least play, in slip: far below what any speed tells. It follows, and never hastens.
+const LEAST_PLAY: f64 = 1e-4;
+
+/// All forms.
+pub const FORMS: [Form; 2] = [Form::Friction, Form::Slip];
+
 /// Rising slip and falling slip follow different curves, whatever the rate.
-pub struct SlipHysteresis;
+pub struct SlipHysteresis {
+    /// Which form.
+    pub form: Form,
+}
+
+/// Part of the way from the middle of the loop to its branch, by sample: 1 where slip has risen for long, -1 where it has
+/// fallen, 0 where the wheel does not roll; `width` is the slip over which it turns.
+fn branch<T: Number>(width: T, series: &Series, slip: &[T]) -> Vec<T> {
+    let mut z = T::constant(0.0);
+    let mut all = vec![z; slip.len()];
+    for k in 1..slip.len() {
+        if series.rolling[k] && series.rolling[k - 1] {
+            let change = slip[k] - slip[k - 1];
+            let direction = if change.value() >= 0.0 { 1.0 } else { -1.0 };
+            let stay = (-(change.abs() / width)).exp();
+            z = (z - direction) * stay + direction;
+            all[k] = z;
+        }
+    }
+    all
+}
 
 impl Describe for SlipHysteresis {
     fn facts(&self) -> Facts {
-        Facts::of(
-            Id::SlipHysteresis,
-            Stage::Friction,
-            "friction = mu(slip) * (1 + loop_share * z), dz/d(slip) = (sign(d slip) - z)/width * sign(d slip)",
-        )
+        let (form, amplitude, stage, equation) = match self.form {
+            Form::Friction => (
+                "",
+                Some(0),
+                Stage::Friction,
+                "friction = mu(slip) * (1 + loop_share * z), dz/d(slip) = (sign(d slip) - z)/width * sign(d slip)",
+            ),
+            Form::Slip => (
+                "slip",
+                None,
+                Stage::Slip,
+                "friction = mu(slip - play * z), dz/d(slip) = (sign(d slip) - z)/play * sign(d slip)",
+            ),
+        };
+        Facts {
+            form,
+            amplitude,
+            ..Facts::of(Id::SlipHysteresis, stage, equation)
+        }
     }
     fn parameters(&self, _context: &Context) -> Vec<Parameter> {
-        vec![
-            Parameter::new("loop_share", "1", -0.6, 0.6),
-            Parameter::new("width", "1", 0.001, 0.15),
-        ]
+        match self.form {
+            Form::Friction => vec![
+                Parameter::new("loop_share", "1", -0.6, 0.6),
+                Parameter::new("width", "1", 0.001, 0.15),
+            ],
+            Form::Slip => vec![Parameter::new("play", "1", LEAST_PLAY, 0.1)],
+        }
     }
     fn starts(&self, _search: &Search<'_>) -> Vec<Vec<f64>> {
-        [0.003, 0.012, 0.04].iter().map(|w| vec![0.0, *w]).collect()
+        let sizes = [0.003, 0.012, 0.04].into_iter();
+        match self.form {
+            Form::Friction => sizes.map(|width| vec![0.0, width]).collect(),
+            Form::Slip => sizes.map(|play| vec![play]).collect(),
+        }
     }
     fn statement(&self, reported: &[Reported<f64>], _p: &[f64]) -> String {
         format!(
@@ -47,19 +103,67 @@ impl Describe for SlipHysteresis {
 
 impl<T: Number> Mechanism<T> for SlipHysteresis {
     fn apply(&self, p: &[T], series: &Series, _context: &Context, state: &mut State<T>) {
-        let mut z = T::constant(0.0);
-        for k in 1..state.slip.len() {
-            if !series.rolling[k] || !series.rolling[k - 1] {
-                continue;
+        // A play is taken up over its own size.
+        let width = match self.form {
+            Form::Friction => p[1],
+            Form::Slip => p[0],
+        };
+        let branch = branch(width, series, &state.slip);
+        match self.form {
+            Form::Friction => {
+                for (friction, z) in state.friction.iter_mut().zip(branch) {
+                    *friction = *friction * (p[0] * z + 1.0);
+                }
             }
-            let change = state.slip[k] - state.slip[k - 1];
-            let direction = if change.value() >= 0.0 { 1.0 } else { -1.0 };
-            let stay = (-(change.abs() / p[1])).exp();
-            z = (z - direction) * stay + direction;
-            state.friction[k] = state.friction[k] * (p[0] * z + 1.0);
+            Form::Slip => {
+                for (slip, z) in state.slip.iter_mut().zip(branch) {
+                    *slip = *slip - p[0] * z;
+                }
+            }
         }
     }
-    fn report(&self, p: &[T], _fitted: &Fitted<'_, T>) -> Vec<Reported<T>> {
-        vec![Reported::new("loop_share", "1", p[0].abs())]
+    fn report(&self, p: &[T], fitted: &Fitted<'_, T>) -> Vec<Reported<T>> {
+        let share = match self.form {
+            Form::Friction => p[0],
+            // Half way to the peak, where the curve is steep and friction not small.
+            Form::Slip => {
+                let at = |relative: T| fitted.law.friction(relative);
+                let half = T::constant(0.5);
+                let play = p[0] / fitted.law.critical;
+                (at(half + play) - at(half - play)) / at(half) * 0.5
+            }
+        };
+        vec![Reported::new("loop_share", "1", share.abs())]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_loop_s_branches_are_reached_over_its_width_at_any_rate() {
+        // Up to a slip of 0.2 and back, in steps that differ by a factor of five.
+        let up = (0..=100).map(|k| 0.002 * f64::from(k));
+        let down = (1..=20).map(|k| 0.2 - 0.01 * f64::from(k));
+        let slip: Vec<f64> = up.chain(down).collect();
+        let series = Series {
+            rolling: vec![true; slip.len()],
+            ..Series::default()
+        };
+        let z: Vec<f64> = branch(0.02, &series, &slip);
+        // 1 - exp(-s / width) on the way up; after the turn back by s: -1 + 2 exp(-s / width), as good as.
+        for (k, s) in [(1, 0.002), (10, 0.02), (50, 0.1)] {
+            assert!((z[k] - (1.0 - f64::exp(-s / 0.02))).abs() < 1e-9);
+        }
+        for (back, s) in [(1, 0.01), (4, 0.04)] {
+            let expected = 2.0 * f64::exp(-s / 0.02) - 1.0;
+            assert!((z[100 + back] - expected).abs() < 1e-4);
+        }
+        let still = Series {
+            rolling: vec![false; slip.len()],
+            ..Series::default()
+        };
+        assert!(branch(0.02, &still, &slip).iter().all(|z| *z == 0.0));
     }
 }

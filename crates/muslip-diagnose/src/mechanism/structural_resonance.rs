@@ -78,7 +78,7 @@ impl Describe for StructuralResonance {
             reported[0].value, reported[1].value
         )
     }
-    fn owns(&self, parameters: &[f64]) -> bool {
+    fn owns(&self, parameters: &[f64], _context: &Context) -> bool {
         self.form == Form::Whole || parameters[1] < RINGS * self.most_damping()
     }
     fn guide(&self) -> Guide {
@@ -149,8 +149,10 @@ mod tests {
 
     #[test]
     fn a_share_that_rings_as_little_as_it_may_is_a_filter_s() {
+        let context = Context::default();
         let [whole, share] = [Form::Whole, Form::Share].map(|form| StructuralResonance { form });
-        assert!(share.owns(&[20.0, 0.05, 0.4]) && !share.owns(&[20.0, 0.1, 0.4]));
-        assert!(whole.owns(&[20.0, 0.3]));
+        let rings = |p: &[f64]| share.owns(p, &context);
+        assert!(rings(&[20.0, 0.05, 0.4]) && !rings(&[20.0, 0.1, 0.4]));
+        assert!(whole.owns(&[20.0, 0.3], &context));
     }
 }

@@ -14,6 +14,9 @@ pub enum Form {
 /// All forms.
 pub const FORMS: [Form; 2] = [Form::Linear, Form::Curved];
 
+/// Shortest time constant in s: what forgets faster is no heat, and depends on the motion of the moment.
+const SHORTEST_S: f64 = 0.05;
+
 /// Friction changes with tread temperature, which friction power raises and time cools.
 pub struct ThermalFade {
     /// Which form.
@@ -43,7 +46,7 @@ impl Describe for ThermalFade {
             Parameter::new(
                 "time_constant",
                 "s",
-                0.05,
+                SHORTEST_S,
                 (10.0 * context.duration).max(5.0),
             ),
         ];
@@ -64,6 +67,9 @@ impl Describe for ThermalFade {
                 }
             })
             .collect()
+    }
+    fn owns(&self, parameters: &[f64], _context: &Context) -> bool {
+        exceeds(parameters[1], SHORTEST_S)
     }
     fn statement(&self, reported: &[Reported<f64>], p: &[f64]) -> String {
         format!(
@@ -150,5 +156,22 @@ impl<T: Number> Mechanism<T> for ThermalFade {
     }
     fn report(&self, p: &[T], _fitted: &Fitted<'_, T>) -> Vec<Reported<T>> {
         vec![Reported::new("time_constant", "s", p[1])]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_forgets_as_fast_as_it_may_is_no_heat() {
+        let context = Context::default();
+        for (form, rest) in [(Form::Linear, &[][..]), (Form::Curved, &[0.1][..])] {
+            let own = |time_constant: f64| {
+                let p = [&[0.3, time_constant], rest].concat();
+                ThermalFade { form }.owns(&p, &context)
+            };
+            assert!(own(0.2) && !own(SHORTEST_S));
+        }
     }
 }

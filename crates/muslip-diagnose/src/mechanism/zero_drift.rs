@@ -32,6 +32,12 @@ pub const FORMS: [Form; 5] = [
     Form::WarmUpCumulative,
 ];
 
+/// Least share of its offset by which a zero moves within a run: one that does not move is no drift. A load that stays
+/// the same and a share of it in the reading look like that.
+const LEAST_MOVED: f64 = 0.2;
+/// Shortest time constant of a warm-up, as a share of a run: what is warm at once is an offset.
+const SHORTEST_WARM_UP: f64 = 0.02;
+
 /// The drag channel's zero moves with time.
 pub struct ZeroDrift {
     /// Which form.
@@ -69,7 +75,12 @@ impl Describe for ZeroDrift {
             Form::LinearOffset => vec![slope, offset],
             Form::WarmUp | Form::WarmUpCumulative => vec![
                 Parameter::new("rise", "N", -2.0 * force, 2.0 * force),
-                Parameter::new("time_constant", "s", 0.02 * context.duration, 5.0 * time),
+                Parameter::new(
+                    "time_constant",
+                    "s",
+                    SHORTEST_WARM_UP * context.duration,
+                    5.0 * time,
+                ),
             ],
         }
     }
@@ -92,6 +103,18 @@ impl Describe for ZeroDrift {
                 .map(|share| vec![0.0, share * time])
                 .collect(),
             _ => Vec::new(),
+        }
+    }
+    fn owns(&self, parameters: &[f64], context: &Context) -> bool {
+        match self.form {
+            Form::Linear | Form::LinearCumulative => true,
+            Form::LinearOffset => {
+                let moved = parameters[0] * context.duration;
+                moved.abs() > LEAST_MOVED * parameters[1].abs()
+            }
+            Form::WarmUp | Form::WarmUpCumulative => {
+                exceeds(parameters[1], SHORTEST_WARM_UP * context.duration)
+            }
         }
     }
     fn by_order(&self, context: &Context) -> bool {
@@ -155,5 +178,24 @@ impl<T: Number> Mechanism<T> for ZeroDrift {
             ],
             _ => vec![Reported::new("slope", "N/s", p[0])],
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_zero_that_does_not_move_is_no_drift() {
+        let context = Context {
+            duration: 10.0,
+            ..Context::default()
+        };
+        let own = |form: Form, p: &[f64]| ZeroDrift { form }.owns(p, &context);
+        // In a run by 5 N beside an offset of 20 N, and by 1 N.
+        assert!(own(Form::LinearOffset, &[0.5, 20.0]) && !own(Form::LinearOffset, &[-0.1, 20.0]));
+        // Warm after a second, and at once.
+        assert!(own(Form::WarmUp, &[20.0, 1.0]) && !own(Form::WarmUp, &[20.0, 0.2]));
+        assert!(own(Form::Linear, &[1e-6]));
     }
 }
