@@ -56,7 +56,7 @@ pub fn beside() -> Result<(String, &'static str)> {
 /// Builds the wheel, installs it into virtual environments of its own and runs the package's tests there, against this
 /// command.
 pub fn test(muslip: &str, features: &str) -> Result<()> {
-    let python = package()?;
+    let python = python_of_package()?;
     for (name, arguments) in [
         (
             "Python: lint",
@@ -148,13 +148,13 @@ pub fn tested(python: &str, muslip: &str, arguments: &[&str]) -> Result<()> {
 
 /// `cargo xtask fleet`: the proof on a large fleet, by a wheel that is built as a release is.
 pub fn fleet(proof: Proof) -> Result<()> {
-    let python = package()?;
+    let python = python_of_package()?;
     prove(&built(&python, "release", FEATURES)?, proof, "fleet")
 }
 
 /// A fleet through Spark, with all that goes wrong: `python/tests/proof.py`.
 fn prove(wheel: &Path, proof: Proof, folder_name: &str) -> Result<()> {
-    let [spark, executor] = fleet_of_spark()?;
+    let [spark, executor] = pythons_of_spark()?;
     install(&spark, wheel)?;
     let mut proved = command(&spark, &[]);
     proved
@@ -180,18 +180,18 @@ pub fn folder() -> PathBuf {
 
 /// Makes every environment that [`test`] uses.
 pub fn environments() -> Result<()> {
-    package()?;
-    fleet_of_spark()?;
+    python_of_package()?;
+    pythons_of_spark()?;
     Ok(())
 }
 
 /// The interpreter that the package is built and tested with.
-pub fn package() -> Result<String> {
+pub fn python_of_package() -> Result<String> {
     environment("python", "requirements.txt")
 }
 
 /// The interpreters of Spark's driver and of its executors, with what runs Spark.
-fn fleet_of_spark() -> Result<[String; 2]> {
+fn pythons_of_spark() -> Result<[String; 2]> {
     setup::for_spark()?;
     Ok([
         environment("spark", "requirements-spark.txt")?,

@@ -3,7 +3,7 @@
 
 use anyhow::Result;
 
-use crate::python::{beside, built, environment, folder, install, tested};
+use crate::python::{beside, built, folder, install, python_of_package, tested};
 use crate::setup;
 use crate::step::CHECKED;
 
@@ -16,11 +16,7 @@ const VERSIONS: [(&str, &str); 2] = [
 /// Builds the wheel once, and runs the package's tests by it on each version.
 pub fn test() -> Result<()> {
     let (muslip, features) = beside()?;
-    let wheel = built(
-        &environment("python", "requirements.txt")?,
-        CHECKED,
-        features,
-    )?;
+    let wheel = built(&python_of_package()?, CHECKED, features)?;
     for (version, requirements) in VERSIONS {
         let python = setup::python_environment_by(
             &setup::python_of(version)?,

@@ -1,6 +1,7 @@
 //! `cargo xtask test`: every test there is.
 
 use std::io::{BufRead, BufReader};
+use std::path::PathBuf;
 use std::process::{Command, Stdio};
 use std::thread;
 
@@ -59,30 +60,16 @@ pub fn run_all() -> Result<()> {
     let files = formats::write()?;
 
     // Downloads and unpacking mostly wait: beside what is built.
-    let environments = thread::spawn(python::environments);
+    let tally = thread::scope(|scope| {
+        let environments = scope.spawn(python::environments);
+        let tally = workspace(files)?;
+        match environments.join() {
+            Ok(made) => made?,
+            Err(_) => bail!("making the Python environments panicked"),
+        }
+        Ok(tally)
+    })?;
 
-    // The long ones too: a test is ignored by `cargo test` because it is long, and for no other reason.
-    let mut workspace = cargo(&[
-        "test",
-        "--workspace",
-        "--profile",
-        CHECKED,
-        "--locked",
-        "--no-fail-fast",
-        "--features",
-        TESTED_FEATURES,
-        "--",
-        "--include-ignored",
-    ]);
-    workspace
-        .env(formats::FILES, files)
-        .env(formats::PYTHON, formats::python()?);
-    let tally = tests("tests of the workspace", workspace)?;
-
-    let Ok(made) = environments.join() else {
-        bail!("making the Python environments panicked");
-    };
-    made?;
     python::test(&trial::under_test(), python::FEATURES)?;
 
     trial::small()?;
@@ -113,6 +100,27 @@ pub fn run_all() -> Result<()> {
         bail!("{} tests were left out", tally.ignored);
     }
     Ok(())
+}
+
+/// Runs the tests of the workspace, with these files of other programs.
+fn workspace(files: PathBuf) -> Result<Tally> {
+    // The long ones too: a test is ignored by `cargo test` because it is long, and for no other reason.
+    let mut workspace = cargo(&[
+        "test",
+        "--workspace",
+        "--profile",
+        CHECKED,
+        "--locked",
+        "--no-fail-fast",
+        "--features",
+        TESTED_FEATURES,
+        "--",
+        "--include-ignored",
+    ]);
+    workspace
+        .env(formats::FILES, files)
+        .env(formats::PYTHON, formats::python()?);
+    tests("tests of the workspace", workspace)
 }
 
 /// Runs a `cargo test`, passing its output on, and sums its results.

@@ -5,7 +5,9 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail};
 
-use crate::python::{beside, environment, folder, install, package, path_with, tested, the_wheel};
+use crate::python::{
+    beside, environment, folder, install, path_with, python_of_package, tested, the_wheel,
+};
 use crate::setup;
 use crate::step::{command, root, run, target};
 
@@ -41,7 +43,7 @@ pub fn build() -> Result<()> {
         audited.arg(&wheel);
         run(&format!("auditwheel of {machine}"), audited)?;
         if machine == std::env::consts::ARCH {
-            let python = package()?;
+            let python = python_of_package()?;
             install(&python, &wheel)?;
             tested(&python, &muslip, &["-k", NOT_OF_A_RELEASE])?;
         } else {

@@ -71,7 +71,7 @@ pub const LEAST_CONFIDENCE: f64 = 0.45;
 pub const FEW_RUNS_SURE: f64 = 0.9;
 /// Share of a name's likelihood from which nothing in the recordings tells an alias from it.
 pub const TIED: f64 = 0.99;
-/// Share of a name's likelihood from which another is hardly less likely: one [`SOFTNESS`] apart.
+/// Share of a name's likelihood from which another is hardly less likely: one softness apart, that is 1/e.
 pub const HARDLY_LESS: f64 = 0.37;
 /// Logarithm of the mean square error by which a prediction is clearly better.
 pub const PREDICTED_APART: f64 = 0.1;

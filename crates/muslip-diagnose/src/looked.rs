@@ -64,10 +64,14 @@ pub fn seen(data: &Data, table: &Table, scores: &[Score], threshold: f64) -> Vec
         .collect()
 }
 
-/// What the starts of one mechanism say: that of the middle one.
+/// What the starts of one mechanism say: that of the middle one. One that no parameter is the size of says no smallest
+/// size: it is heard only where all are like it.
 #[must_use]
 pub fn looked_for(id: Id, seen: &[Seen]) -> LookedFor {
     let mut own: Vec<&Seen> = seen.iter().filter(|s| s.id == id).collect();
+    if own.iter().any(|s| s.least.is_some()) {
+        own.retain(|s| s.least.is_some());
+    }
     let size = |s: &&Seen| s.least.as_ref().map_or(f64::INFINITY, |l| l.value);
     own.sort_by(|a, b| size(a).total_cmp(&size(b)));
     let middle = own.get(own.len() / 2);

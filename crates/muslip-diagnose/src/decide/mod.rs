@@ -16,7 +16,7 @@ use crate::data::Data;
 use crate::innovations::dependence::{self, Dependence};
 use crate::innovations::hypothesis::{Guess, Judged, judge, judge_added};
 use crate::looked::Seen;
-use crate::mechanism::{Balance, Id};
+use crate::mechanism::Id;
 use crate::model::Model;
 
 /// Most names.
@@ -158,6 +158,7 @@ impl Question<'_> {
         let before = Before::new(data, so_far, self.untold, taken_up.at_sensors);
         let screen = Screen::new(data, before, &self.free, self.excluded);
         let mut trials = screen.trials();
+        self.hold_beside_chain(&[], &mut trials, taken_up);
         // What only the chain remembers has taken the place of other names.
         let of_chain = trials.iter().any(|t| !t.outlasts_chain);
         if of_chain && next(data, &trials, taken_up).is_none() {
@@ -165,59 +166,79 @@ impl Question<'_> {
                 .iter()
                 .filter_map(|t| Some(t.mechanism()?.0))
                 .collect();
-            trials.extend(screen.trials_without(&tried));
+            let mut others = screen.trials_without(&tried);
+            self.hold_beside_chain(&trials, &mut others, taken_up);
+            trials.extend(others);
             rank(data, &mut trials);
         }
-        self.hold_beside_chain(&mut trials, taken_up);
         (trials, screen.seen())
     }
 
-    /// Holds what stands beside a memory of the chain's that gains more in its balance: torque or force that comes late is
-    /// an inertia, too, where nothing else is asked.
-    fn hold_beside_chain(&self, trials: &mut [Trial], taken_up: &TakenUp) {
+    /// Holds names that stand, or could in another's place, beside each memory of the chain's that outweighs them: torque
+    /// or drag that comes late is an inertia, too, where nothing else is asked. Memories are among the trials and those
+    /// `beside` them.
+    fn hold_beside_chain(&self, beside: &[Trial], trials: &mut [Trial], taken_up: &TakenUp) {
         let data = self.data;
-        let memories: Vec<(Trial, &[Balance])> = trials
+        let of_chain = |t: &&Trial| !t.outlasts_chain;
+        let memories: Vec<Trial> = trials
             .iter()
-            .filter(|t| !t.outlasts_chain)
-            .filter_map(|t| {
-                let (_, entry) = t.mechanism()?;
-                Some((t.clone(), data.catalogue.get(entry).guide().touches))
-            })
+            .chain(beside)
+            .filter(of_chain)
+            .cloned()
             .collect();
-        let doubtful = |t: &&mut Trial| t.mechanism().is_some() && !t.remembers && stands(t);
-        for trial in trials.iter_mut().filter(doubtful) {
-            let balance = trial.claim.balance(data);
-            // Best first, as the trials are.
-            let memory = memories.iter().find(|(memory, touches)| {
+        for memory in memories {
+            let Some((_, entry)) = memory.mechanism() else {
+                continue;
+            };
+            let touches = data.catalogue.get(entry).guide().touches;
+            let outweighed = |trial: &&mut Trial| {
                 let more = memory.weight() - trial.weight();
-                touches.contains(&balance) && more > softness(memory.weight())
-            });
-            if let Some((memory, _)) = memory {
-                trial.beside_chain = self.stands_beside(trial, memory, taken_up);
+                let named = trial.mechanism().is_some() && could_be_taken(trial);
+                named
+                    && !trial.remembers
+                    && touches.contains(&trial.claim.balance(data))
+                    && more > softness(memory.weight())
+            };
+            let mut outweighed = trials.iter_mut().filter(outweighed).peekable();
+            if outweighed.peek().is_none() {
+                continue;
+            }
+            let with_memory = settled(data, under_own_noise(data, memory.judged.clone()));
+            let at_sensors = taken_up.at_sensors + memory.at_sensors.0.max(0.0);
+            let before = Before::new(data, &with_memory, self.untold, at_sensors);
+            for trial in outweighed {
+                trial.beside_chain = stands_beside(data, trial, &before);
             }
         }
     }
+}
 
-    /// Whether a mechanism stands beside another, too.
-    fn stands_beside(&self, trial: &Trial, other: &Trial, taken_up: &TakenUp) -> bool {
-        let data = self.data;
-        let Some((_, entry)) = trial.mechanism() else {
-            return false;
-        };
-        let with_other = settled(data, under_own_noise(data, other.judged.clone()));
-        let before = Before::new(data, &with_other, self.untold, taken_up.at_sensors);
-        let mut model = with_other.model.clone();
-        let own = trial.judged.model.terms.iter().filter(|t| t.entry == entry);
-        model.terms.extend(own.cloned());
-        let both = judge_added(
-            data,
-            &model,
-            &with_other.extra,
-            before.beside(),
-            effort(data),
-        );
-        both.is_some_and(|both| stands(&before.tried(trial.claim.clone(), both, trial.size)))
-    }
+/// Whether a trial is one that [`next`] may take.
+fn could_be_taken(trial: &Trial) -> bool {
+    stands(trial) || could_stand(trial)
+}
+
+/// Whether a mechanism could still be taken beside a model that has what it was tried without. How large it is was settled
+/// where it was tried; what cannot be judged beside the other is not told from it.
+fn stands_beside(data: &Data, trial: &Trial, before: &Before<'_>) -> bool {
+    let with_other = before.judged;
+    let Some((_, entry)) = trial.mechanism() else {
+        return false;
+    };
+    let mut model = with_other.model.clone();
+    let own = trial.judged.model.terms.iter().filter(|t| t.entry == entry);
+    model.terms.extend(own.cloned());
+    let both = judge_added(
+        data,
+        &model,
+        &with_other.extra,
+        before.beside(),
+        effort(data),
+    );
+    both.is_some_and(|both| {
+        let again = before.tried(trial.claim.clone(), both, trial.size);
+        stands(&again) || !stands(trial) && could_stand(&again)
+    })
 }
 
 /// Decides what is named beside the base model; `untold` is what the chain's own timing does not tell.

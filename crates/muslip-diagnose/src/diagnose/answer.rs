@@ -31,7 +31,7 @@ pub(super) struct NameOfForce {
     pub(super) remembers: bool,
     /// Its confidence.
     pub(super) confidence: f64,
-    /// What is hardly less likely.
+    /// What its round holds for hardly less likely.
     pub(super) rivals: Vec<Id>,
 }
 

@@ -56,7 +56,7 @@ impl Describe for BrakeFade {
             .collect()
     }
     fn owns(&self, parameters: &[f64], _context: &Context) -> bool {
-        exceeds(parameters[1], SHORTEST_S)
+        above_limit(parameters[1], SHORTEST_S)
     }
     fn statement(&self, reported: &[Reported<f64>], _p: &[f64]) -> String {
         format!(

@@ -250,9 +250,17 @@ pub trait Describe: Send + Sync {
     }
 }
 
+/// Share of a limit within which a parameter is held there by it.
+const AT_LIMIT: f64 = 0.01;
+
 /// Whether a parameter is above its lowest value, and not held there by its limit.
-pub fn exceeds(parameter: f64, lowest: f64) -> bool {
-    parameter > 1.01 * lowest
+pub fn above_limit(parameter: f64, lowest: f64) -> bool {
+    parameter > (1.0 + AT_LIMIT) * lowest
+}
+
+/// Whether a parameter is below its highest value, and not held there by its limit.
+pub fn below_limit(parameter: f64, highest: f64) -> bool {
+    parameter < (1.0 - AT_LIMIT) * highest
 }
 
 /// What a mechanism does, in plain or dual numbers.

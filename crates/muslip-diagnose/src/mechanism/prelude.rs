@@ -2,7 +2,7 @@
 
 pub use super::describe::{
     Against, Describe, Facts, Fitted, Mechanism, Parameter, Reported, Residuals, Search, Speed,
-    Stage, exceeds,
+    Stage, above_limit, below_limit,
 };
 pub use super::guide::{Alias, Compensation, Example, Guide, Kind, Memory, Sign, runs};
 pub use super::id::Id;

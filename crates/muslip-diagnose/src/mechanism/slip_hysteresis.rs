@@ -11,11 +11,11 @@ pub enum Form {
     Slip,
 }
 
-/// Least play, in slip: far below what any speed tells. It follows, and never hastens.
-const LEAST_PLAY: f64 = 1e-4;
-
 /// All forms.
 pub const FORMS: [Form; 2] = [Form::Friction, Form::Slip];
+
+/// Least half of a play, in slip: far below what any speed tells.
+const LEAST_HALF_PLAY: f64 = 1e-4;
 
 /// Rising slip and falling slip follow different curves, whatever the rate.
 pub struct SlipHysteresis {
@@ -40,6 +40,22 @@ fn branch<T: Number>(width: T, series: &Series, slip: &[T]) -> Vec<T> {
     all
 }
 
+/// Slip that follows with a play of so much on either side (the play operator: Brokate and Sprekels 1996, Hysteresis and
+/// Phase Transitions); without any from where the wheel begins to roll.
+fn with_play<T: Number>(half: T, series: &Series, slip: &mut [T]) {
+    let mut felt: Option<T> = None;
+    for (slip, rolling) in slip.iter_mut().zip(&series.rolling) {
+        let (least, most) = (*slip - half, *slip + half);
+        felt = rolling.then(|| match felt {
+            Some(felt) if felt.value() < least.value() => least,
+            Some(felt) if felt.value() > most.value() => most,
+            Some(felt) => felt,
+            None => *slip,
+        });
+        *slip = felt.unwrap_or(*slip);
+    }
+}
+
 impl Describe for SlipHysteresis {
     fn facts(&self) -> Facts {
         let (form, amplitude, stage, equation) = match self.form {
@@ -53,7 +69,7 @@ impl Describe for SlipHysteresis {
                 "slip",
                 None,
                 Stage::Slip,
-                "friction = mu(slip - play * z), dz/d(slip) = (sign(d slip) - z)/play * sign(d slip)",
+                "friction = mu(slip'), slip' = min(max(slip', slip - half_play), slip + half_play)",
             ),
         };
         Facts {
@@ -68,21 +84,26 @@ impl Describe for SlipHysteresis {
                 Parameter::new("loop_share", "1", -0.6, 0.6),
                 Parameter::new("width", "1", 0.001, 0.15),
             ],
-            Form::Slip => vec![Parameter::new("play", "1", LEAST_PLAY, 0.1)],
+            Form::Slip => vec![Parameter::new("half_play", "1", LEAST_HALF_PLAY, 0.1)],
         }
     }
     fn starts(&self, _search: &Search<'_>) -> Vec<Vec<f64>> {
         let sizes = [0.003, 0.012, 0.04].into_iter();
         match self.form {
             Form::Friction => sizes.map(|width| vec![0.0, width]).collect(),
-            Form::Slip => sizes.map(|play| vec![play]).collect(),
+            Form::Slip => sizes.map(|half_play| vec![half_play]).collect(),
         }
     }
     fn statement(&self, reported: &[Reported<f64>], _p: &[f64]) -> String {
-        format!(
-            "friction follows a loop: rising and falling slip differ by {:.1} % either side of their mean, whatever the rate",
-            100.0 * reported[0].value
-        )
+        let percent = 100.0 * reported[0].value;
+        match self.form {
+            Form::Friction => format!(
+                "friction follows a loop: rising and falling slip differ by {percent:.1} % either side of their mean, whatever the rate"
+            ),
+            Form::Slip => format!(
+                "friction follows a loop: the tyre's slip follows the wheel's with a play, so rising and falling slip differ by {percent:.1} % either side of their mean half way to the peak, and by nothing at it, whatever the rate"
+            ),
+        }
     }
     fn guide(&self) -> Guide {
         Guide {
@@ -103,37 +124,32 @@ impl Describe for SlipHysteresis {
 
 impl<T: Number> Mechanism<T> for SlipHysteresis {
     fn apply(&self, p: &[T], series: &Series, _context: &Context, state: &mut State<T>) {
-        // A play is taken up over its own size.
-        let width = match self.form {
-            Form::Friction => p[1],
-            Form::Slip => p[0],
-        };
-        let branch = branch(width, series, &state.slip);
         match self.form {
             Form::Friction => {
+                let branch = branch(p[1], series, &state.slip);
                 for (friction, z) in state.friction.iter_mut().zip(branch) {
                     *friction = *friction * (p[0] * z + 1.0);
                 }
             }
-            Form::Slip => {
-                for (slip, z) in state.slip.iter_mut().zip(branch) {
-                    *slip = *slip - p[0] * z;
-                }
-            }
+            Form::Slip => with_play(p[0], series, &mut state.slip),
         }
     }
     fn report(&self, p: &[T], fitted: &Fitted<'_, T>) -> Vec<Reported<T>> {
-        let share = match self.form {
-            Form::Friction => p[0],
+        let loop_share = |share: T| Reported::new("loop_share", "1", share);
+        match self.form {
+            Form::Friction => vec![loop_share(p[0].abs())],
             // Half way to the peak, where the curve is steep and friction not small.
             Form::Slip => {
                 let at = |relative: T| fitted.law.friction(relative);
                 let half = T::constant(0.5);
                 let play = p[0] / fitted.law.critical;
-                (at(half + play) - at(half - play)) / at(half) * 0.5
+                let share = (at(half + play) - at(half - play)) / at(half) * 0.5;
+                vec![
+                    loop_share(share.abs()),
+                    Reported::new("half_play", "1", p[0]),
+                ]
             }
-        };
-        vec![Reported::new("loop_share", "1", share.abs())]
+        }
     }
 }
 
@@ -165,5 +181,29 @@ mod tests {
             ..Series::default()
         };
         assert!(branch(0.02, &still, &slip).iter().all(|z| *z == 0.0));
+    }
+
+    #[test]
+    fn a_slip_with_play_stays_until_the_play_is_taken_up_and_never_runs_against_the_wheel_s() {
+        let slip: Vec<f64> = (0..400)
+            .map(|k| 0.1 + 0.08 * (0.05 * f64::from(k)).sin())
+            .collect();
+        let series = Series {
+            rolling: vec![true; slip.len()],
+            ..Series::default()
+        };
+        let half = 0.01;
+        let mut felt = slip.clone();
+        with_play(half, &series, &mut felt);
+        let steps = felt.windows(2).zip(slip.windows(2));
+        for (felt, slip) in steps {
+            let (own, of_wheel) = (felt[1] - felt[0], slip[1] - slip[0]);
+            assert!(own * of_wheel >= 0.0 && own.abs() <= of_wheel.abs() + 1e-15);
+        }
+        let apart = |k: usize| slip[k] - felt[k];
+        // Rising from the start, falling after the turn at 31, rising again after that at 94.
+        assert!((apart(25) - half).abs() < 1e-12 && (apart(80) + half).abs() < 1e-12);
+        assert!((apart(32) - apart(31)).abs() > 0.0 && (felt[32] - felt[31]).abs() < 1e-15);
+        assert!((apart(150) - half).abs() < 1e-12);
     }
 }

@@ -79,7 +79,7 @@ impl Describe for StructuralResonance {
         )
     }
     fn owns(&self, parameters: &[f64], _context: &Context) -> bool {
-        self.form == Form::Whole || parameters[1] < RINGS * self.most_damping()
+        self.form == Form::Whole || below_limit(parameters[1], self.most_damping())
     }
     fn guide(&self) -> Guide {
         Guide {
@@ -108,9 +108,6 @@ impl Describe for StructuralResonance {
         }
     }
 }
-
-/// Share of the most damping up to which a share of the force rings.
-const RINGS: f64 = 0.99;
 
 impl StructuralResonance {
     /// A share that hardly rings is any difference between two filters.

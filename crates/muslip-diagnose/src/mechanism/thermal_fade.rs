@@ -69,7 +69,7 @@ impl Describe for ThermalFade {
             .collect()
     }
     fn owns(&self, parameters: &[f64], _context: &Context) -> bool {
-        exceeds(parameters[1], SHORTEST_S)
+        above_limit(parameters[1], SHORTEST_S)
     }
     fn statement(&self, reported: &[Reported<f64>], p: &[f64]) -> String {
         format!(

@@ -32,8 +32,8 @@ pub const FORMS: [Form; 5] = [
     Form::WarmUpCumulative,
 ];
 
-/// Least share of its offset by which a zero moves within a run: one that does not move is no drift. A load that stays
-/// the same and a share of it in the reading look like that.
+/// Least share of its offset by which a zero moves within a run, or by the noise of a reading: one that does not move is no
+/// drift. A share of a load that stays the same looks like that.
 const LEAST_MOVED: f64 = 0.2;
 /// Shortest time constant of a warm-up, as a share of a run: what is warm at once is an offset.
 const SHORTEST_WARM_UP: f64 = 0.02;
@@ -109,11 +109,11 @@ impl Describe for ZeroDrift {
         match self.form {
             Form::Linear | Form::LinearCumulative => true,
             Form::LinearOffset => {
-                let moved = parameters[0] * context.duration;
-                moved.abs() > LEAST_MOVED * parameters[1].abs()
+                let moved = (parameters[0] * context.duration).abs();
+                moved > LEAST_MOVED * parameters[1].abs() || moved > context.drag_sigma
             }
             Form::WarmUp | Form::WarmUpCumulative => {
-                exceeds(parameters[1], SHORTEST_WARM_UP * context.duration)
+                above_limit(parameters[1], SHORTEST_WARM_UP * context.duration)
             }
         }
     }
@@ -189,11 +189,13 @@ mod tests {
     fn a_zero_that_does_not_move_is_no_drift() {
         let context = Context {
             duration: 10.0,
+            drag_sigma: 3.0,
             ..Context::default()
         };
         let own = |form: Form, p: &[f64]| ZeroDrift { form }.owns(p, &context);
         // In a run by 5 N beside an offset of 20 N, and by 1 N.
         assert!(own(Form::LinearOffset, &[0.5, 20.0]) && !own(Form::LinearOffset, &[-0.1, 20.0]));
+        assert!(own(Form::LinearOffset, &[0.5, 200.0]), "beyond the noise");
         // Warm after a second, and at once.
         assert!(own(Form::WarmUp, &[20.0, 1.0]) && !own(Form::WarmUp, &[20.0, 0.2]));
         assert!(own(Form::Linear, &[1e-6]));
