@@ -57,7 +57,8 @@ pub const ALIKE_NATS: f64 = 0.5;
 pub const SOFTNESS: f64 = 4.0;
 /// As [`SOFTNESS`], as a share of what the better one gains.
 pub const SOFT_SHARE: f64 = 0.03;
-/// Share of another's gain from which a memory that predicts the drag clearly better comes first.
+/// Share of another's gain from which a memory that predicts the drag clearly better comes first, and a name that the other's
+/// parameters say as well.
 pub const ALIKE_SHARE: f64 = 0.7;
 /// Most confidence in what works through the force where unseen runs do not bear it out: on nine development sets 14 of 19
 /// such names were true.

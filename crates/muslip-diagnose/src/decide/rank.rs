@@ -1,6 +1,6 @@
 //! The order of a round's trials.
 
-use super::trial::{Claim, Trial};
+use super::trial::{Claim, Trial, stands};
 use crate::constants::{ALIKE_NATS, ALIKE_SHARE, PREDICTED_APART, SOFT_SHARE, SOFTNESS};
 use crate::data::Data;
 
@@ -10,9 +10,24 @@ pub fn rank(data: &Data, trials: &mut [Trial]) {
     trials.sort_by(|a, b| order(a, b).then(b.gain.total_cmp(&a.gain)));
     least_claims_first(trials, Trial::weight, |t| balances(data, t));
     better_predicted_first(trials, Trial::weight, |t| t.remembers.then_some(t.predicts));
+    said_as_well_first(trials, Trial::weight, |own, other| {
+        let own = own.mechanism().filter(|_| stands(own));
+        own.is_some_and(|(id, _)| other.says_as_well == Some(id))
+    });
     commoner_first(trials, Trial::weight, |t| {
         let mechanism = t.mechanism();
         mechanism.is_some_and(|(_, entry)| data.catalogue.get(entry).facts().rare)
+    });
+}
+
+/// What another's parameters say as well comes before that, where it gains much the same.
+fn said_as_well_first<T>(
+    best_first: &mut [T],
+    gain: impl Fn(&T) -> f64,
+    said: impl Fn(&T, &T) -> bool,
+) {
+    sort_neighbours(best_first, |own, other| {
+        gain(own) > ALIKE_SHARE * gain(other) && said(own, other)
     });
 }
 
@@ -95,6 +110,17 @@ mod tests {
         better_predicted_first(&mut all, |t| t.0, |t| t.1);
         let gains = all.map(|t| t.0);
         assert_eq!(gains, [330.0, 310.0, 400.0, 100.0, 90.0, 80.0]);
+    }
+
+    #[test]
+    fn what_another_says_as_well_comes_before_it_where_it_gains_much_the_same() {
+        // Gain, name, and what the parameters say as well.
+        let mut all = [(100.0, 'z', 'c'), (80.0, 'c', '-'), (60.0, 'y', 'c')];
+        said_as_well_first(&mut all, |t| t.0, |own, other| other.2 == own.1);
+        assert_eq!(all.map(|t| t.1), ['c', 'z', 'y']);
+        let mut all = [(100.0, 'z', 'c'), (60.0, 'c', '-')];
+        said_as_well_first(&mut all, |t| t.0, |own, other| other.2 == own.1);
+        assert_eq!(all.map(|t| t.1), ['z', 'c']);
     }
 
     #[test]

@@ -78,6 +78,8 @@ pub struct Trial {
     pub first: bool,
     /// Whether its parameters are the mechanism's own, and not at a limit where its form is another's.
     pub own: bool,
+    /// Another mechanism that its parameters say as well.
+    pub says_as_well: Option<Id>,
     /// Whether a measuring chain leaves what looks like it.
     pub fed_by_chain: bool,
     /// Whether it is a memory: what was before counts.
@@ -256,6 +258,8 @@ impl<'a> Before<'a> {
             first: !named || at_sensors.0 > self.taken_up,
             at_sensors,
             own,
+            says_as_well: term
+                .and_then(|(_, entry, p)| data.catalogue.get(entry).says_as_well(p, &data.context)),
             fed_by_chain: term
                 .is_some_and(|(_, entry, _)| data.catalogue.get(entry).fed_by_chain()),
             remembers: memory_s.is_some(),

@@ -243,6 +243,10 @@ pub trait Describe: Send + Sync {
     fn owns(&self, _parameters: &[f64], _context: &Context) -> bool {
         true
     }
+    /// Another mechanism that these parameters say as well, and that claims less.
+    fn says_as_well(&self, _parameters: &[f64], _context: &Context) -> Option<Id> {
+        None
+    }
     /// Whether it goes by the order of the campaign's runs: a recording whose place in it is not known is predicted
     /// without it.
     fn by_order(&self, _context: &Context) -> bool {

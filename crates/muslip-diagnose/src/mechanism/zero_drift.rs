@@ -32,8 +32,8 @@ pub const FORMS: [Form; 5] = [
     Form::WarmUpCumulative,
 ];
 
-/// Least share of its offset by which a zero moves within a run, or by the noise of a reading: one that does not move is no
-/// drift. A share of a load that stays the same looks like that.
+/// Share of its offset within which a zero, and by less than a reading's noise, does not move: a share of a load that stays
+/// the same is read like that.
 const LEAST_MOVED: f64 = 0.2;
 /// Shortest time constant of a warm-up, as a share of a run: what is warm at once is an offset.
 const SHORTEST_WARM_UP: f64 = 0.02;
@@ -107,15 +107,17 @@ impl Describe for ZeroDrift {
     }
     fn owns(&self, parameters: &[f64], context: &Context) -> bool {
         match self.form {
-            Form::Linear | Form::LinearCumulative => true,
-            Form::LinearOffset => {
-                let moved = (parameters[0] * context.duration).abs();
-                moved > LEAST_MOVED * parameters[1].abs() || moved > context.drag_sigma
-            }
+            Form::Linear | Form::LinearOffset | Form::LinearCumulative => true,
             Form::WarmUp | Form::WarmUpCumulative => {
                 above_limit(parameters[1], SHORTEST_WARM_UP * context.duration)
             }
         }
+    }
+    fn says_as_well(&self, parameters: &[f64], context: &Context) -> Option<Id> {
+        let moved = (parameters[0] * context.duration).abs();
+        let unmoved =
+            |offset: f64| moved < LEAST_MOVED * offset.abs() && moved < context.drag_sigma;
+        (self.form == Form::LinearOffset && unmoved(parameters[1])).then_some(Id::LoadCrosstalk)
     }
     fn by_order(&self, context: &Context) -> bool {
         self.form.cumulative() && !context.clock_continues
@@ -186,18 +188,31 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_zero_that_does_not_move_is_no_drift() {
+    fn a_zero_that_does_not_move_is_a_share_of_the_load_as_well() {
         let context = Context {
             duration: 10.0,
             drag_sigma: 3.0,
             ..Context::default()
         };
-        let own = |form: Form, p: &[f64]| ZeroDrift { form }.owns(p, &context);
-        // In a run by 5 N beside an offset of 20 N, and by 1 N.
-        assert!(own(Form::LinearOffset, &[0.5, 20.0]) && !own(Form::LinearOffset, &[-0.1, 20.0]));
-        assert!(own(Form::LinearOffset, &[0.5, 200.0]), "beyond the noise");
-        // Warm after a second, and at once.
-        assert!(own(Form::WarmUp, &[20.0, 1.0]) && !own(Form::WarmUp, &[20.0, 0.2]));
-        assert!(own(Form::Linear, &[1e-6]));
+        let zero = |form: Form| ZeroDrift { form };
+        let said = |slope: f64, offset: f64| {
+            zero(Form::LinearOffset).says_as_well(&[slope, offset], &context)
+        };
+        // In a run by 1 N beside an offset of 20 N; by a quarter of it; by more than the noise.
+        assert_eq!(said(-0.1, 20.0), Some(Id::LoadCrosstalk));
+        assert_eq!(said(0.2, 8.0), None);
+        assert_eq!(said(0.5, 200.0), None);
+        assert_eq!(zero(Form::Linear).says_as_well(&[1e-6], &context), None);
+    }
+
+    #[test]
+    fn what_is_warm_at_once_does_not_warm_up() {
+        let context = Context {
+            duration: 10.0,
+            ..Context::default()
+        };
+        let form = Form::WarmUp;
+        let warms = |time_constant: f64| ZeroDrift { form }.owns(&[20.0, time_constant], &context);
+        assert!(warms(1.0) && !warms(0.2));
     }
 }
