@@ -81,3 +81,32 @@ pub fn looked_for(id: Id, seen: &[Seen]) -> LookedFor {
         minimum_detectable: middle.and_then(|s| s.least.clone()),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn seen(value: Option<f64>) -> Seen {
+        Seen {
+            id: Id::SlipHysteresis,
+            least: value.map(|value| MinimumDetectable {
+                name: "loop_share".to_owned(),
+                value,
+                unit: "1".to_owned(),
+            }),
+            identifiable: value.is_some(),
+        }
+    }
+
+    #[test]
+    fn starts_without_a_size_do_not_hide_the_smallest_of_those_that_have_one() {
+        let of = |all: &[Option<f64>]| {
+            let all: Vec<Seen> = all.iter().copied().map(seen).collect();
+            looked_for(Id::SlipHysteresis, &all)
+        };
+        let mixed = of(&[None, Some(0.04), None, Some(0.02), Some(0.03), None]);
+        assert!(mixed.identifiable);
+        assert_eq!(mixed.minimum_detectable.map(|m| m.value), Some(0.03));
+        assert!(of(&[None, None]).minimum_detectable.is_none());
+    }
+}

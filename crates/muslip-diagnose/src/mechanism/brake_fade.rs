@@ -124,3 +124,14 @@ impl<T: Number> Mechanism<T> for BrakeFade {
         ]
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_cools_as_fast_as_it_may_is_no_brake() {
+        let own = |time_constant: f64| BrakeFade.owns(&[0.1, time_constant], &Context::default());
+        assert!(own(3.0) && !own(SHORTEST_S));
+    }
+}
