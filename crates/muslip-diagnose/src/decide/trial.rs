@@ -404,13 +404,13 @@ fn seen_on_unseen_runs(trial: &Trial) -> bool {
     let (mean, t) = trial.unseen;
     match trial.claim {
         Claim::Mechanism(..) => {
-            let clearly = trial.predicts > CLEARLY_PREDICTED;
-            let least = if clearly && !trial.fed_by_chain {
+            let least = if clearly_predicts(trial) && !trial.fed_by_chain {
                 LEAST_T_NOT_FED
             } else {
                 LEAST_T
             };
-            mean > 0.0 && (t >= least || clear_where_it_is(trial))
+            let clear_where_it_is = trial.unanimous[0] && clearly_predicts(trial);
+            mean > 0.0 && (t >= least || clear_where_it_is)
         }
         // What says nothing of what it is has to be seen at the sensors' noise as well: fitted noise may have left it.
         Claim::Dependence(_) => {
@@ -420,10 +420,9 @@ fn seen_on_unseen_runs(trial: &Trial) -> bool {
     }
 }
 
-/// Whether no unseen run speaks against what is clear in some: the drag is predicted clearly better.
-fn clear_where_it_is(trial: &Trial) -> bool {
-    let better = trial.predicts.is_finite() && trial.predicts > CLEARLY_PREDICTED;
-    trial.unanimous[0] && better
+/// Whether the drag is predicted clearly better, by what works through the force.
+fn clearly_predicts(trial: &Trial) -> bool {
+    trial.predicts.is_finite() && trial.predicts > CLEARLY_PREDICTED
 }
 
 #[cfg(test)]
