@@ -7,8 +7,9 @@ use rayon::prelude::*;
 
 use super::gram::{Columns, Packed, Solved, solve};
 use super::noise::{BalanceParts, Source};
-use super::whiten::{ByVariance, Course, Kind, Lanes, Whitener, traces, whiteners};
+use super::whiten::{ByVariance, Course, Kind, Lanes, MOST, Whitener, traces, whiteners};
 use crate::data::Data;
+use crate::number::finite_or_zero;
 
 /// Prior standard deviation of a part's log size about where it starts: wide, so that a part that the data say
 /// nothing of stays plausible.
@@ -23,7 +24,7 @@ const FARTHEST_WALK: f64 = 1.5;
 /// Longest step of a log size.
 const LONGEST_STEP: f64 = 1.5;
 /// A step that gains less, in nats, is the last.
-const SMALL_GAIN: f64 = 0.05;
+const SMALL_GAIN: f64 = 0.2;
 /// Share of what the slope promises that a step has to gain.
 const ENOUGH: f64 = 1e-4;
 
@@ -57,9 +58,30 @@ fn beyond(source: &Source) -> f64 {
     ((source.log_std - source.log_cap) / PRIOR_BEYOND).max(0.0)
 }
 
+/// A log size no farther from where it starts than it may go.
+fn within_reach(source: &Source, log_std: f64) -> f64 {
+    // A walk is the drag's own noise, which is known.
+    let reach = if source.kind == Some(Kind::Walk) {
+        FARTHEST_WALK
+    } else {
+        FARTHEST
+    };
+    log_std.clamp(source.log_start - reach, source.log_start + reach)
+}
+
 /// Slope of [`penalty`] by the log size of one part.
 fn penalty_slope(source: &Source) -> f64 {
     (source.log_std - source.log_start) / (PRIOR * PRIOR) + beyond(source) / PRIOR_BEYOND
+}
+
+/// Curvature of [`penalty`] by the same.
+fn penalty_curvature(source: &Source) -> f64 {
+    let of_cap = if beyond(source) > 0.0 {
+        PRIOR_BEYOND.powi(-2)
+    } else {
+        0.0
+    };
+    PRIOR.powi(-2) + of_cap
 }
 
 /// The balance under noise of these sizes.
@@ -72,6 +94,11 @@ struct Loss {
     /// variance components: Zhou, Hu, Zhou and Lange 2019, J. Comput. Graph. Stat. 28). It sees a part that is far too
     /// small, of which the slope says nothing.
     balance: DVector<f64>,
+    /// Whether a size is as far from its start as it goes, and would go on.
+    held: Vec<bool>,
+    /// Curvature by the log sizes: the average information (Gilmour, Thompson and Cullis 1995, Biometrics 51), the mean of
+    /// the observed and the expected one, which needs no trace of a product, with the prior's own.
+    curvature: DMatrix<f64>,
 }
 
 /// A run's readings of a balance.
@@ -152,8 +179,58 @@ impl<'a> Fitting<'a> {
                 whitener.explained(white, &own)
             })
             .collect();
-        slopes(parts, value, &traces(&whiteners), &explained)
+        let curvature = self.curvature(parts, &whiteners, &white, &weights);
+        slopes(parts, value, &traces(&whiteners), &explained, curvature)
     }
+
+    /// Twice Wᵀ P W, W being what each part is expected to have been in what is left, P what weighs residuals of fitted
+    /// columns, with the prior's own curvature.
+    fn curvature(
+        &self,
+        parts: &BalanceParts,
+        whiteners: &[&Whitener],
+        white: &[(Lanes, DMatrix<f64>)],
+        weights: &DMatrix<f64>,
+    ) -> DMatrix<f64> {
+        let sizes = parts.sizes();
+        let last = weights.ncols() - 1;
+        let left = weights.column(last);
+        let by_run: Vec<(DMatrix<f64>, DMatrix<f64>)> = whiteners
+            .par_iter()
+            .zip(&self.runs)
+            .zip(white)
+            .map(|((whitener, run), (white, _))| {
+                let own: Vec<f64> = run.columns.which.iter().map(|i| left[*i]).collect();
+                let expected = whitener.apply(&whitener.expected(white, &own, &sizes));
+                let of_each = expected.products(0, whitener.samples().len());
+                let unknown = weights.columns(0, last).select_rows(&run.columns.which);
+                (of_each, expected.products_with(white) * unknown)
+            })
+            .collect();
+        let mut of_each = DMatrix::zeros(MOST + 1, MOST + 1);
+        let mut by_columns = DMatrix::zeros(MOST + 1, last);
+        for (own, columns) in &by_run {
+            of_each += own;
+            by_columns += columns;
+        }
+        let information = 2.0 * (of_each - &by_columns * by_columns.transpose());
+        let place = places(parts);
+        DMatrix::from_fn(place.len(), place.len(), |i, j| {
+            let prior = if i == j {
+                penalty_curvature(&parts.sources[i])
+            } else {
+                0.0
+            };
+            finite_or_zero(information[(place[i], place[j])]) + prior
+        })
+    }
+}
+
+/// Where each part stands among what [`Whitener::expected`] tells apart.
+fn places(parts: &BalanceParts) -> Vec<usize> {
+    let mut remembered = 0..;
+    let place = |kind: Option<Kind>| kind.and_then(|_| remembered.next()).unwrap_or(MOST);
+    parts.sources.iter().map(|s| s.kind).map(place).collect()
 }
 
 /// By column, how much of it is in each direction in which the fitted columns are not known, and in what is left of the
@@ -179,6 +256,7 @@ fn slopes(
     value: f64,
     traces: &[ByVariance],
     explained: &[[ByVariance; 2]],
+    curvature: DMatrix<f64>,
 ) -> Result<Loss, Option<f64>> {
     let n = parts.sources.len();
     let [mut trace, mut square] = [DVector::zeros(n), DVector::zeros(n)];
@@ -186,10 +264,18 @@ fn slopes(
         trace += by_size(parts, own) - by_size(parts, unknown);
         square += by_size(parts, left);
     }
-    let prior = |i: usize| penalty_slope(&parts.sources[i]);
+    let slope = DVector::from_fn(n, |i, _| {
+        trace[i] - square[i] + penalty_slope(&parts.sources[i])
+    });
+    let held = |(s, slope): (&Source, &f64)| {
+        let downhill = s.log_std - 1e-6 * slope.signum();
+        (within_reach(s, downhill) - downhill).abs() > 0.5e-6
+    };
     let loss = Loss {
         value,
-        slope: DVector::from_fn(n, |i, _| trace[i] - square[i] + prior(i)),
+        held: parts.sources.iter().zip(slope.iter()).map(held).collect(),
+        slope,
+        curvature,
         balance: DVector::from_fn(n, |i, _| {
             let step = 0.5 * f64::ln(square[i] / trace[i]);
             if step.is_finite() {
@@ -216,59 +302,67 @@ fn by_size(parts: &BalanceParts, of: &ByVariance) -> DVector<f64> {
     DVector::from_iterator(parts.sources.len(), sources)
 }
 
-/// Steps that balance what the parts explain before the search turns to the slopes.
-const BALANCING_STEPS: usize = 6;
+/// A part whose balancing step is longer is far from where the curvature holds.
+const FAR: f64 = 0.7;
 
-/// Fits the log sizes of all parts: first by balancing them, then by a quasi-Newton search (Broyden, Fletcher,
-/// Goldfarb, Shanno), in at most so many steps; the loss that is reached.
+impl Loss {
+    /// Newton's step of the parts that are near their best, beside the balancing one of those that are far, and what the
+    /// quadratic promises it to gain; nothing where the curvature is none.
+    fn newton(&self) -> Option<(DVector<f64>, f64)> {
+        let n = self.slope.len();
+        let far = |i: &usize| {
+            let own = self.balance[*i];
+            own.abs() > FAR && own * self.slope[*i] < 0.0
+        };
+        let free = (0..n).filter(|i| !self.held[*i]);
+        let (far, near): (Vec<usize>, Vec<usize>) = free.partition(far);
+        let mut step = DVector::zeros(n);
+        for &i in &far {
+            step[i] = self.balance[i];
+        }
+        let slope = (&self.slope + &self.curvature * &step).select_rows(&near);
+        let own = self.curvature.select_rows(&near).select_columns(&near);
+        let solved = own.cholesky()?.solve(&slope);
+        for (at, &i) in near.iter().enumerate() {
+            step[i] = -solved[at];
+        }
+        let promised = if far.is_empty() {
+            -self.slope.dot(&step) - 0.5 * step.dot(&(&self.curvature * &step))
+        } else {
+            f64::INFINITY
+        };
+        Some((step, promised))
+    }
+}
+
+/// Fits the log sizes of all parts by Newton's steps under the average information, in at most so many steps; the loss
+/// that is reached. A balancing step goes before the first, and after one that gains little.
 pub fn fit(readings: &Readings<'_>, parts: &mut BalanceParts, steps: usize) -> f64 {
     let fitting = Fitting::new(readings, parts);
     let Ok(mut here) = fitting.loss(parts, f64::INFINITY) else {
         return f64::INFINITY;
     };
-    let mut inverse: Option<DMatrix<f64>> = None;
-    for step in 0..steps {
-        let balancing = step < BALANCING_STEPS;
-        let start = preconditioner(&here);
-        let direction = if balancing {
-            here.balance.clone()
-        } else {
-            -(inverse.as_ref().unwrap_or(&start) * &here.slope)
-        };
-        let Some((there, next)) = along(&fitting, parts, &here, direction) else {
-            if balancing || inverse.take().is_some() {
-                continue;
-            }
-            break;
-        };
-        let step = log_sizes(&there) - log_sizes(parts);
-        let change = &next.slope - &here.slope;
-        inverse = (!balancing)
-            .then(|| updated(inverse.unwrap_or(start), &step, &change))
-            .flatten();
-        let gained = here.value - next.value;
-        (*parts, here) = (there, next);
-        if gained < SMALL_GAIN {
+    let mut balancing = true;
+    for _ in 0..steps {
+        let (newton, promised) = here.newton().unzip();
+        if promised.unwrap_or(f64::INFINITY) < SMALL_GAIN {
             break;
         }
+        let mut directions = [newton, Some(here.balance.clone())];
+        if balancing {
+            directions.reverse();
+        }
+        let mut directions = directions.into_iter().flatten();
+        let next = directions.find_map(|own| along(&fitting, parts, &here, own));
+        let Some((there, next)) = next else { break };
+        let little = here.value - next.value < SMALL_GAIN;
+        (*parts, here) = (there, next);
+        if little && balancing {
+            break;
+        }
+        balancing = little;
     }
     here.value
-}
-
-fn log_sizes(parts: &BalanceParts) -> DVector<f64> {
-    DVector::from_iterator(parts.sources.len(), parts.sources.iter().map(|s| s.log_std))
-}
-
-/// Inverse curvatures that would make a slope's step the balancing one.
-fn preconditioner(here: &Loss) -> DMatrix<f64> {
-    DMatrix::from_diagonal(&here.slope.zip_map(&here.balance, |slope, step| {
-        let own = -step / slope;
-        if own.is_finite() && own > 0.0 {
-            own.clamp(1e-4, 1.0)
-        } else {
-            0.05
-        }
-    }))
 }
 
 /// The first place along a direction where the loss falls as its slope promises; `None` where there is none.
@@ -287,13 +381,7 @@ fn along(
     for _ in 0..5 {
         let mut there = parts.clone();
         for (s, by) in there.sources.iter_mut().zip(direction.iter()) {
-            // A walk is the drag's own noise, which is known.
-            let reach = if s.kind == Some(Kind::Walk) {
-                FARTHEST_WALK
-            } else {
-                FARTHEST
-            };
-            s.log_std = (s.log_std + share * by).clamp(s.log_start - reach, s.log_start + reach);
+            s.log_std = within_reach(s, s.log_std + share * by);
         }
         match fitting.loss(&there, here.value + ENOUGH * share * promised) {
             Ok(next) => return Some((there, next)),
@@ -308,17 +396,93 @@ fn along(
     None
 }
 
-/// Inverse curvatures after a step and the change of the slopes over it; `None` where they do not bend upwards.
-fn updated(
-    inverse: DMatrix<f64>,
-    step: &DVector<f64>,
-    change: &DVector<f64>,
-) -> Option<DMatrix<f64>> {
-    let along = step.dot(change);
-    if along <= 1e-12 {
-        return None;
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::innovations::noise::{Slopes, parts};
+    use crate::innovations::rows::rows_of;
+    use crate::innovations::toy::{CRITICAL, Noise, PEAK, stop};
+    use crate::mechanism::Balance;
+    use crate::model::Model;
+
+    /// The residual of every balance of a toy campaign with its noise as it starts.
+    fn balances(data: &Data) -> Vec<(BalanceParts, Vec<Columns>)> {
+        let law = Model::of_law(PEAK, CRITICAL);
+        let parts = parts(data, &Slopes::new(data, &law));
+        let columns = |balance: Balance| {
+            let runs = 0..data.series.len();
+            let own = |run: usize| {
+                let rows = rows_of(data, &law, run);
+                vec![data.blocks[run][balance as usize].mean(rows.of(balance))]
+            };
+            runs.map(own).collect()
+        };
+        let with_columns = |own: BalanceParts| {
+            let columns = columns(own.balance);
+            (own, columns)
+        };
+        parts.into_iter().map(with_columns).collect()
     }
-    let n = step.len();
-    let left = DMatrix::identity(n, n) - step * change.transpose() / along;
-    Some(&left * inverse * left.transpose() + step * step.transpose() / along)
+
+    fn with_readings<T>(
+        data: &Data,
+        columns: &[Columns],
+        ask: impl FnOnce(&Readings<'_>) -> T,
+    ) -> T {
+        ask(&Readings {
+            data,
+            columns,
+            precision: &|_| 0.0,
+            others: &DMatrix::zeros(1, 1),
+            stride: 1,
+        })
+    }
+
+    #[test]
+    fn slopes_are_differences_and_a_newton_step_from_the_best_is_none() {
+        let data = stop(Noise::TYPICAL, 6);
+        for (start, columns) in balances(&data) {
+            with_readings(&data, &columns, |readings| {
+                let mut best = start.clone();
+                fit(readings, &mut best, 60);
+                let fitting = Fitting::new(readings, &best);
+                let loss = |parts: &BalanceParts| fitting.loss(parts, f64::INFINITY).ok().unwrap();
+                for i in 0..start.sources.len() {
+                    let by = |h: f64| {
+                        let mut there = start.clone();
+                        there.sources[i].log_std += h;
+                        loss(&there).value
+                    };
+                    let (own, h) = (loss(&start).slope[i], 1e-3);
+                    let difference = (by(h) - by(-h)) / (2.0 * h);
+                    let name = start.sources[i].name;
+                    assert!(
+                        (own - difference).abs() < 1e-3 * own.abs().max(1.0),
+                        "{name}: {own} {difference}"
+                    );
+                }
+                let (_, promised) = loss(&best).newton().unwrap();
+                assert!(promised < 1.0, "{:?}: {promised}", start.balance);
+            });
+        }
+    }
+
+    #[test]
+    fn the_best_sizes_are_found_from_wherever_the_search_starts() {
+        let data = stop(Noise::TYPICAL, 7);
+        for (start, columns) in balances(&data) {
+            with_readings(&data, &columns, |readings| {
+                let from = |by: f64| {
+                    let mut parts = start.clone();
+                    for source in &mut parts.sources {
+                        source.log_std += by;
+                    }
+                    fit(readings, &mut parts, 60)
+                };
+                let (small, own, large) = (from(-2.0), from(0.0), from(2.0));
+                let range = small.max(own).max(large) - small.min(own).min(large);
+                assert!(range < 1.0, "{:?}: {small} {own} {large}", start.balance);
+            });
+        }
+    }
 }

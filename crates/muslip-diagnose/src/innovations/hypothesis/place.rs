@@ -67,7 +67,7 @@ impl Place {
             for _ in 0..SWEEPS {
                 let all = &|_: Balance| true;
                 let own = &mut by_balance;
-                fit_in_turn(data, &table, &mut noise, own, all, false, effort);
+                fit_in_turn(data, &table, &mut noise, own, all, effort);
             }
         }
         let held = matches!(known, Known::Noise(_));
@@ -143,7 +143,7 @@ impl Place {
             !added || touches(&self.table.columns[balance as usize], columns.clone())
         };
         let (noise, own) = (&mut self.noise, &mut self.by_balance);
-        fit_in_turn(data, &self.table, noise, own, &touched, true, effort);
+        fit_in_turn(data, &self.table, noise, own, &touched, effort);
         let (noise, own) = (self.noise, self.by_balance);
         Self::at(data, self.model, self.table, noise, own, self.held)
     }

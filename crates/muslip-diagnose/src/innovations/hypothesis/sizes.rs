@@ -60,15 +60,13 @@ pub fn with_sizes(mut fresh: Vec<BalanceParts>, old: &[BalanceParts]) -> Vec<Bal
 pub const SWEEPS: usize = 2;
 
 /// Fits the noise of one balance after the other, by the likelihood of all: they share the coefficients. `by_balance`
-/// are the inner products of the table's columns under the noise as it is, and then as fitted; `carried` is whether it
-/// was fitted to another model.
+/// are the inner products of the table's columns under the noise as it is, and then as fitted.
 pub fn fit_in_turn(
     data: &Data,
     table: &Table,
     noise: &mut Noise,
     by_balance: &mut [Vec<[Gram; 2]>],
     touched: &dyn Fn(Balance) -> bool,
-    carried: bool,
     effort: Effort,
 ) {
     let prior = |i: usize| precision(table, i);
@@ -91,11 +89,7 @@ pub fn fit_in_turn(
             others: &others,
             stride: effort.noise_stride,
         };
-        if carried {
-            fit_from_both(&readings, &mut part, effort.noise_steps);
-        } else {
-            estimate::fit(&readings, &mut part, effort.noise_steps);
-        }
+        estimate::fit(&readings, &mut part, effort.noise_steps);
         noise.replace(data, at, part);
         by_balance[at] = grams(noise.filters(at), columns);
         products[at] = total(&by_balance[at]).products;
@@ -108,20 +102,4 @@ pub fn touches(columns: &[Columns], which: core::ops::Range<usize>) -> bool {
         .iter()
         .filter(|run| run.len() >= which.end)
         .any(|run| run[which.clone()].iter().flatten().any(|x| *x != 0.0))
-}
-
-/// Fits the sizes of a balance's noise from what they are and, where they were fitted to another model, from the
-/// sensors' own as well: what swallowed an effect before it was in the model must be let go of.
-fn fit_from_both(readings: &Readings<'_>, part: &mut BalanceParts, steps: usize) {
-    let mut anew = part.clone();
-    for source in &mut anew.sources {
-        source.log_std = source.log_start;
-    }
-    let (carried_on, afresh) = rayon::join(
-        || estimate::fit(readings, part, steps),
-        || estimate::fit(readings, &mut anew, steps),
-    );
-    if afresh < carried_on {
-        *part = anew;
-    }
 }

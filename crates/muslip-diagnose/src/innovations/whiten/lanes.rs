@@ -115,6 +115,29 @@ impl Lanes {
         self.stacked().columns(from, to - from) * self.turned().rows(from, to - from)
     }
 
+    /// These rows of so many columns.
+    pub(super) fn of_readings<const C: usize>(rows: &[[f64; C]]) -> Self {
+        let mut all = Self::room(C, rows.len());
+        let width = all.groups() * LANES;
+        let readings = all.values.as_flattened_mut().chunks_exact_mut(width);
+        for (reading, row) in readings.zip(rows) {
+            reading[..C].copy_from_slice(row);
+            reading[C..].fill(0.0);
+        }
+        all
+    }
+
+    /// One column.
+    pub(super) fn column(&self, index: usize) -> Vec<f64> {
+        self.stacked().row(index).iter().copied().collect()
+    }
+
+    /// Inner products with other columns (a column each) over all readings.
+    #[must_use]
+    pub fn products_with(&self, other: &Self) -> DMatrix<f64> {
+        self.stacked() * other.turned()
+    }
+
     /// Sums of the columns, by how much of each (row) a sum (column) has.
     #[must_use]
     pub(super) fn sums(&self, weights: &DMatrix<f64>) -> Self {

@@ -24,7 +24,7 @@ use pulp::Arch;
 use rayon::prelude::*;
 
 use lanes::LANES;
-use passes::{Apply, Covariance, Found, RUNS, Squares, Traces};
+use passes::{Apply, Covariance, Expected, Found, RUNS, Squares, Traces};
 
 pub use course::{Course, Sizes};
 pub use lanes::Lanes;
@@ -147,6 +147,22 @@ impl Whitener {
             }
         }
         out.map(|own| self.course.with_twin(own))
+    }
+
+    /// What each part, then the readings' own noise, is expected to have been in a sum of columns whose innovations (each
+    /// over its standard deviation) are given: V_i V⁻¹ y, V_i being what the part adds to V. `weights` holds how much of
+    /// each column the sum has. They add up to the sum itself, but for a level of which nothing is known.
+    #[must_use]
+    pub fn expected(&self, innovations: &Lanes, weights: &[f64], sizes: &Sizes) -> Lanes {
+        let mut placed = DMatrix::zeros(weights.len(), LANES);
+        placed.column_mut(0).copy_from_slice(weights);
+        let own = innovations.sums(&placed).column(0);
+        let rows = Arch::new().dispatch(Expected {
+            whitener: self,
+            sizes,
+            innovations: &own,
+        });
+        Lanes::of_readings(&rows)
     }
 
     /// Innovations of several columns, each over its own standard deviation.

@@ -107,6 +107,15 @@ fn dense(time: &[f64], segments: &[core::ops::Range<usize>], parts: &[Part<'_>])
     covariance
 }
 
+/// Sizes of these parts beside the readings' own noise.
+fn sizes_of(parts: &[Part<'_>], diffuse: f64) -> Sizes {
+    Sizes {
+        white: WHITE,
+        diffuse,
+        parts: core::array::from_fn(|i| parts.get(i).map_or(0.0, |part| part.std)),
+    }
+}
+
 /// The filter on one run, and columns through it.
 struct Filter {
     own: Whitener,
@@ -123,8 +132,7 @@ impl Filter {
         let course = Arc::new(Course::new(time, segments, 1, parts));
         let sizes = Sizes {
             white,
-            diffuse,
-            parts: core::array::from_fn(|i| parts.get(i).map_or(0.0, |part| part.std)),
+            ..sizes_of(parts, diffuse)
         };
         // A shorter run beside it, which ends before.
         let shorter = Arc::new(Course::new(time, &segments[..2], 1, parts));
@@ -278,4 +286,59 @@ fn slopes_of_the_likelihood_are_its_differences() {
             "{i}: {own} {difference}"
         );
     }
+}
+
+#[test]
+fn what_each_part_is_expected_to_have_been_equals_dense_algebra() {
+    let mut draw = ChaCha8Rng::seed_from_u64(10);
+    let (time, gain) = times(&mut draw);
+    let segments = [2..30, 34..45, 45..80];
+    let parts = [
+        part(Kind::Forgetting(0.05), 0.8, &gain),
+        part(Kind::Constant, 1.3, &gain),
+        part(Kind::Forgetting(0.4), 0.5, &[]),
+        part(Kind::Filtered(0.06), 0.9, &gain),
+    ];
+    let filter = Filter::new(&time, &segments, WHITE, 1.0, &parts);
+    let column: Vec<f64> = (0..80).map(|_| draw.random_range(-1.0..1.0)).collect();
+    let sizes = sizes_of(&parts, 1.0);
+    let white = filter.apply(&[&column, &gain]);
+    let expected = filter.own.expected(&white, &[1.0, 0.0], &sizes);
+    let samples = filter.own.samples();
+    let own = DVector::from_iterator(samples.len(), samples.iter().map(|k| column[*k]));
+    let factor = dense(&time, &segments, &parts).cholesky().unwrap();
+    let weighed = factor.solve(&own);
+    let white_part = DMatrix::identity(samples.len(), samples.len()) * (WHITE * WHITE);
+    for (i, part) in parts.iter().enumerate() {
+        let covariance = dense(&time, &segments, core::slice::from_ref(part)) - &white_part;
+        let difference = DVector::from_vec(expected.column(i)) - covariance * &weighed;
+        assert!(difference.amax() < 1e-9, "{i}: {}", difference.amax());
+    }
+    let difference = DVector::from_vec(expected.column(MOST)) - &white_part * &weighed;
+    assert!(difference.amax() < 1e-9);
+}
+
+#[test]
+fn what_each_part_is_expected_to_have_been_is_what_it_explains() {
+    let mut draw = ChaCha8Rng::seed_from_u64(11);
+    let (time, gain) = times(&mut draw);
+    let parts = [
+        part(Kind::Walk, 0.6, &[]),
+        part(Kind::Forgetting(0.05), 0.8, &gain),
+        part(Kind::Integrated(0.1), 2.0, &[]),
+        part(Kind::Filtered(0.06), 0.9, &gain),
+    ];
+    let filter = Filter::new(&time, &[2..30, 34..45, 45..80], WHITE, 1e6, &parts);
+    let column: Vec<f64> = (0..80).map(|_| draw.random_range(-1.0..1.0)).collect();
+    let sizes = sizes_of(&parts, 1e6);
+    let white = filter.apply(&[&column]);
+    let expected = filter.own.expected(&white, &[1.0], &sizes);
+    let along = filter.own.apply(&expected).products_with(&white);
+    let [_, explained] = filter.own.explained(&white, &DMatrix::identity(1, 1));
+    for i in 0..parts.len() {
+        let square = sizes.variance(i) * explained.parts[i];
+        assert!((along[(i, 0)] - square).abs() < 1e-6 * square, "{i}");
+    }
+    let square = WHITE * WHITE * explained.white;
+    assert!((along[(MOST, 0)] - square).abs() < 1e-6 * square);
 }

@@ -1,7 +1,9 @@
-//! The passes of columns: forward to their innovations, back to what the parts explain of them.
+//! The passes of columns: forward to their innovations, back to what the parts explain of them, and forward again to
+//! what each part is expected to have been.
 
 use pulp::{Simd, WithSimd};
 
+use crate::innovations::whiten::course::Sizes;
 use crate::innovations::whiten::lanes::{LANES, Lane};
 use crate::innovations::whiten::part::{MOST, TWIN};
 use crate::innovations::whiten::{ByVariance, Whitener};
@@ -150,5 +152,99 @@ impl<const LAST: bool> WithSimd for Squares<'_, LAST> {
                 }
             }
         }
+    }
+}
+
+/// The passes of [`Whitener::expected`]: back over one column's innovations, then forward to what each part is expected to
+/// have been, given the column.
+pub struct Expected<'a> {
+    pub whitener: &'a Whitener,
+    pub sizes: &'a Sizes,
+    /// Innovations of the column, each over its standard deviation.
+    pub innovations: &'a [f64],
+}
+
+impl WithSimd for Expected<'_> {
+    /// By reading: of the parts, then of the readings' own noise.
+    type Output = Vec<[f64; MOST + 1]>;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _simd: S) -> Self::Output {
+        let (pushed, own) = self.pushed();
+        self.followed(&pushed, &own)
+    }
+}
+
+impl Expected<'_> {
+    /// Back over the readings: by how much each state is pushed before each reading, for a unit of its variance, and the
+    /// column over its covariance.
+    #[inline(always)]
+    fn pushed(&self) -> (Vec<[f64; MOST]>, Vec<f64>) {
+        let Whitener { course, found } = self.whitener;
+        let n = course.steps.len();
+        let mut pushed = vec![[0.0; MOST]; n];
+        let mut own = vec![0.0; n];
+        let mut s = [0.0; MOST];
+        for (at, step) in course.steps.iter().enumerate().rev() {
+            let mut u = self.innovations[at] * found.inverse[at];
+            for i in 0..MOST {
+                u -= found.gains[at][i] * s[i];
+            }
+            own[at] = u;
+            for i in 0..MOST {
+                s[i] += step.row[i] * u;
+            }
+            if step.fresh {
+                s[0] = 0.0;
+            }
+            let driven = course.driven(at, step);
+            pushed[at] = core::array::from_fn(|i| driven[i] * s[i]);
+            if let Some(pair) = &course.filtered {
+                let shared = 0.5 * course.driven_together(at, step);
+                pushed[at][pair.at] += shared * s[TWIN];
+                pushed[at][TWIN] += shared * s[pair.at];
+            }
+            let decay = course.decay_of(step);
+            let level = s[0];
+            for i in 0..MOST {
+                s[i] = s[i] * decay[i] + course.integrated[i] * step.dt * level;
+            }
+        }
+        (pushed, own)
+    }
+
+    /// Forward: what enters each reading by each part that is pushed so.
+    #[inline(always)]
+    fn followed(&self, pushed: &[[f64; MOST]], own: &[f64]) -> Vec<[f64; MOST + 1]> {
+        let course = &self.whitener.course;
+        let variance: [f64; MOST] = core::array::from_fn(|i| match &course.filtered {
+            Some(pair) if i == TWIN => self.sizes.variance(pair.at),
+            _ => self.sizes.variance(i),
+        });
+        let white = self.sizes.white * self.sizes.white;
+        let (mut state, mut level) = ([0.0; MOST], [0.0; MOST]);
+        let readings = course.steps.iter().zip(pushed).zip(own);
+        readings
+            .map(|((step, pushed), own)| {
+                let decay = course.decay_of(step);
+                let mut out = [0.0; MOST + 1];
+                for i in 0..MOST {
+                    level[i] += course.integrated[i] * step.dt * state[i];
+                    state[i] = decay[i] * state[i] + variance[i] * pushed[i];
+                }
+                if step.fresh {
+                    level = [0.0; MOST];
+                    state[0] = 0.0;
+                }
+                for i in 0..MOST {
+                    out[i] = step.row[i] * state[i] + step.row[0] * level[i];
+                }
+                if let Some(pair) = &course.filtered {
+                    out[pair.at] += core::mem::take(&mut out[TWIN]);
+                }
+                out[MOST] = white * own;
+                out
+            })
+            .collect()
     }
 }

@@ -8,7 +8,7 @@ mod columns;
 mod covariance;
 mod traces;
 
-pub use columns::{Apply, Squares};
+pub use columns::{Apply, Expected, Squares};
 pub use covariance::{Covariance, Found};
 pub use traces::Traces;
 
