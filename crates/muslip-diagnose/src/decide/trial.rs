@@ -376,8 +376,7 @@ fn seen_at_sensors(trial: &Trial) -> bool {
         // Runs that differ at random do not line up to leave so little of their differences.
         let lined_up = trial.unanimous[1]
             && trial.gain > 0.0
-            && trial.predicts.is_finite()
-            && trial.predicts > LINED_UP_PREDICTED;
+            && lowers_drag_s_error(trial.predicts, LINED_UP_PREDICTED);
         let large = sum > LARGE_GAIN_AT_SENSORS && t > LEAST_T_OF_LARGE;
         let plain = trial.gain > 0.0 && t > LEAST_T_AT_SENSORS_NOT_FED;
         let alike = t > LEAST_T_AT_SENSORS || !trial.fed_by_chain && (large || plain);
@@ -404,13 +403,13 @@ fn seen_on_unseen_runs(trial: &Trial) -> bool {
     let (mean, t) = trial.unseen;
     match trial.claim {
         Claim::Mechanism(..) => {
-            let least = if clearly_predicts(trial) && !trial.fed_by_chain {
+            let clearly = lowers_drag_s_error(trial.predicts, CLEARLY_PREDICTED);
+            let least = if clearly && !trial.fed_by_chain {
                 LEAST_T_NOT_FED
             } else {
                 LEAST_T
             };
-            let clear_where_it_is = trial.unanimous[0] && clearly_predicts(trial);
-            mean > 0.0 && (t >= least || clear_where_it_is)
+            mean > 0.0 && (t >= least || trial.unanimous[0] && clearly)
         }
         // What says nothing of what it is has to be seen at the sensors' noise as well: fitted noise may have left it.
         Claim::Dependence(_) => {
@@ -420,9 +419,10 @@ fn seen_on_unseen_runs(trial: &Trial) -> bool {
     }
 }
 
-/// Whether the drag is predicted clearly better, by what works through the force.
-fn clearly_predicts(trial: &Trial) -> bool {
-    trial.predicts.is_finite() && trial.predicts > CLEARLY_PREDICTED
+/// Whether the drag's mean square error falls by more than this logarithm. What does not work through the force predicts
+/// no drag, however well it does.
+fn lowers_drag_s_error(predicts: f64, least: f64) -> bool {
+    predicts.is_finite() && predicts > least
 }
 
 #[cfg(test)]
@@ -434,6 +434,13 @@ mod tests {
             runs: runs.to_vec(),
             halves: halves.to_vec(),
         }
+    }
+
+    #[test]
+    fn what_predicts_no_drag_lowers_no_error_of_it() {
+        assert!(lowers_drag_s_error(0.3, CLEARLY_PREDICTED));
+        assert!(!lowers_drag_s_error(0.2, CLEARLY_PREDICTED));
+        assert!(!lowers_drag_s_error(f64::INFINITY, CLEARLY_PREDICTED));
     }
 
     #[test]

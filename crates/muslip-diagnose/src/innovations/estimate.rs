@@ -1,4 +1,4 @@
-//! Sizes of the noise's parts by restricted maximum likelihood, along its exact slopes.
+//! Sizes of the noise's parts by restricted maximum likelihood, by Newton's steps.
 
 use std::sync::Arc;
 
@@ -9,7 +9,6 @@ use super::gram::{Columns, Packed, Solved, solve};
 use super::noise::{BalanceParts, Source};
 use super::whiten::{ByVariance, Course, Kind, Lanes, MOST, Whitener, traces, whiteners};
 use crate::data::Data;
-use crate::number::finite_or_zero;
 
 /// Prior standard deviation of a part's log size about where it starts: wide, so that a part that the data say
 /// nothing of stays plausible.
@@ -23,7 +22,7 @@ const FARTHEST: f64 = 7.0;
 const FARTHEST_WALK: f64 = 1.5;
 /// Longest step of a log size.
 const LONGEST_STEP: f64 = 1.5;
-/// A step that gains less, in nats, is the last.
+/// A balancing step that gains less, in nats, is the last, and a Newton step that promises less is not taken.
 const SMALL_GAIN: f64 = 0.2;
 /// Share of what the slope promises that a step has to gain.
 const ENOUGH: f64 = 1e-4;
@@ -96,8 +95,9 @@ struct Loss {
     balance: DVector<f64>,
     /// Whether a size is as far from its start as it goes, and would go on.
     held: Vec<bool>,
-    /// Curvature by the log sizes: the average information (Gilmour, Thompson and Cullis 1995, Biometrics 51), the mean of
-    /// the observed and the expected one, which needs no trace of a product, with the prior's own.
+    /// Curvature by the log sizes: the average information (Gilmour, Thompson and Cullis 1995, Biometrics 51), with the
+    /// prior's own. By variances it is the mean of the observed and the expected information, and needs no trace of a
+    /// product; by their logarithms a slope is left out, which is nothing on average.
     curvature: DMatrix<f64>,
 }
 
@@ -221,7 +221,7 @@ impl<'a> Fitting<'a> {
             } else {
                 0.0
             };
-            finite_or_zero(information[(place[i], place[j])]) + prior
+            information[(place[i], place[j])] + prior
         })
     }
 }
@@ -307,7 +307,7 @@ const FAR: f64 = 0.7;
 
 impl Loss {
     /// Newton's step of the parts that are near their best, beside the balancing one of those that are far, and what the
-    /// quadratic promises it to gain; nothing where the curvature is none.
+    /// quadratic promises it to gain; `None` where the curvature is not positive definite.
     fn newton(&self) -> Option<(DVector<f64>, f64)> {
         let n = self.slope.len();
         let far = |i: &usize| {
@@ -336,7 +336,8 @@ impl Loss {
 }
 
 /// Fits the log sizes of all parts by Newton's steps under the average information, in at most so many steps; the loss
-/// that is reached. A balancing step goes before the first, and after one that gains little.
+/// that is reached. A balancing step goes before the first, unless that promises next to nothing, and after one that gains
+/// little.
 pub fn fit(readings: &Readings<'_>, parts: &mut BalanceParts, steps: usize) -> f64 {
     let fitting = Fitting::new(readings, parts);
     let Ok(mut here) = fitting.loss(parts, f64::INFINITY) else {
@@ -438,51 +439,64 @@ mod tests {
         })
     }
 
-    #[test]
-    fn slopes_are_differences_and_a_newton_step_from_the_best_is_none() {
-        let data = stop(Noise::TYPICAL, 6);
-        for (start, columns) in balances(&data) {
-            with_readings(&data, &columns, |readings| {
-                let mut best = start.clone();
-                fit(readings, &mut best, 60);
-                let fitting = Fitting::new(readings, &best);
-                let loss = |parts: &BalanceParts| fitting.loss(parts, f64::INFINITY).ok().unwrap();
-                for i in 0..start.sources.len() {
-                    let by = |h: f64| {
-                        let mut there = start.clone();
-                        there.sources[i].log_std += h;
-                        loss(&there).value
-                    };
-                    let (own, h) = (loss(&start).slope[i], 1e-3);
-                    let difference = (by(h) - by(-h)) / (2.0 * h);
-                    let name = start.sources[i].name;
-                    assert!(
-                        (own - difference).abs() < 1e-3 * own.abs().max(1.0),
-                        "{name}: {own} {difference}"
-                    );
-                }
-                let (_, promised) = loss(&best).newton().unwrap();
-                assert!(promised < 1.0, "{:?}: {promised}", start.balance);
-            });
+    /// Asks something of the search in every balance of a toy campaign.
+    fn in_every_balance(seed: u64, ask: impl Fn(&Readings<'_>, &BalanceParts)) {
+        let data = stop(Noise::TYPICAL, seed);
+        let all = balances(&data);
+        assert_eq!(all.len(), 3);
+        for (start, columns) in all {
+            with_readings(&data, &columns, |readings| ask(readings, &start));
         }
     }
 
+    fn loss(fitting: &Fitting<'_>, parts: &BalanceParts) -> Loss {
+        fitting.loss(parts, f64::INFINITY).ok().unwrap()
+    }
+
     #[test]
-    fn the_best_sizes_are_found_from_wherever_the_search_starts() {
-        let data = stop(Noise::TYPICAL, 7);
-        for (start, columns) in balances(&data) {
-            with_readings(&data, &columns, |readings| {
-                let from = |by: f64| {
-                    let mut parts = start.clone();
-                    for source in &mut parts.sources {
-                        source.log_std += by;
-                    }
-                    fit(readings, &mut parts, 60)
+    fn slopes_are_differences() {
+        in_every_balance(6, |readings, start| {
+            let fitting = Fitting::new(readings, start);
+            let slope = loss(&fitting, start).slope;
+            for (i, source) in start.sources.iter().enumerate() {
+                let by = |h: f64| {
+                    let mut there = start.clone();
+                    there.sources[i].log_std += h;
+                    loss(&fitting, &there).value
                 };
-                let (small, own, large) = (from(-2.0), from(0.0), from(2.0));
-                let range = small.max(own).max(large) - small.min(own).min(large);
-                assert!(range < 1.0, "{:?}: {small} {own} {large}", start.balance);
-            });
-        }
+                let (own, h) = (slope[i], 1e-3);
+                let difference = (by(h) - by(-h)) / (2.0 * h);
+                let apart = (own - difference).abs();
+                assert!(apart < 1e-3 * own.abs().max(1.0), "{}", source.name);
+            }
+        });
+    }
+
+    #[test]
+    fn the_search_ends_where_newton_promises_less_than_a_nat() {
+        in_every_balance(6, |readings, start| {
+            let mut best = start.clone();
+            fit(readings, &mut best, 60);
+            let (_, promised) = loss(&Fitting::new(readings, &best), &best)
+                .newton()
+                .unwrap();
+            assert!(promised < 1.0, "{:?}: {promised}", start.balance);
+        });
+    }
+
+    #[test]
+    fn sizes_seven_times_too_small_or_too_large_lead_to_a_loss_within_a_nat() {
+        in_every_balance(7, |readings, start| {
+            let from = |by: f64| {
+                let mut parts = start.clone();
+                for source in &mut parts.sources {
+                    source.log_std += by;
+                }
+                fit(readings, &mut parts, 60)
+            };
+            let (small, own, large) = (from(-2.0), from(0.0), from(2.0));
+            let range = small.max(own).max(large) - small.min(own).min(large);
+            assert!(range < 1.0, "{:?}: {small} {own} {large}", start.balance);
+        });
     }
 }

@@ -135,7 +135,7 @@ mod tests {
                 continue;
             };
             tried += 1;
-            // The noise's sizes are the best of the restricted likelihood, which the loss is not.
+            // The search for the noise's sizes ends within a nat of the best.
             assert!(
                 with.loss < base.loss + 1.0,
                 "{:?}: {} beside {}",
