@@ -226,7 +226,7 @@ impl<'a> Fitting<'a> {
     }
 }
 
-/// Where each part stands among what [`Whitener::expected`] tells apart.
+/// Where each part stands in what is told by part: those that remember in their order, then the readings' own noise.
 fn places(parts: &BalanceParts) -> Vec<usize> {
     let mut remembered = 0..;
     let place = |kind: Option<Kind>| kind.and_then(|_| remembered.next()).unwrap_or(MOST);
@@ -291,14 +291,9 @@ fn slopes(
 
 /// What a unit of each part's variance does, times that variance.
 fn by_size(parts: &BalanceParts, of: &ByVariance) -> DVector<f64> {
-    let mut remembered = of.parts.iter();
-    let sources = parts.sources.iter().map(|s| {
-        let own = match s.kind {
-            Some(_) => remembered.next().copied().unwrap_or(0.0),
-            None => of.white,
-        };
-        (2.0 * s.log_std).exp() * own
-    });
+    let own = |place: usize| of.parts.get(place).copied().unwrap_or(of.white);
+    let sources = parts.sources.iter().zip(places(parts));
+    let sources = sources.map(|(s, place)| (2.0 * s.log_std).exp() * own(place));
     DVector::from_iterator(parts.sources.len(), sources)
 }
 
@@ -403,49 +398,29 @@ mod tests {
     use crate::innovations::noise::{Slopes, parts};
     use crate::innovations::rows::rows_of;
     use crate::innovations::toy::{CRITICAL, Noise, PEAK, stop};
-    use crate::mechanism::Balance;
     use crate::model::Model;
 
-    /// The residual of every balance of a toy campaign with its noise as it starts.
-    fn balances(data: &Data) -> Vec<(BalanceParts, Vec<Columns>)> {
-        let law = Model::of_law(PEAK, CRITICAL);
-        let parts = parts(data, &Slopes::new(data, &law));
-        let columns = |balance: Balance| {
-            let runs = 0..data.series.len();
-            let own = |run: usize| {
-                let rows = rows_of(data, &law, run);
-                vec![data.blocks[run][balance as usize].mean(rows.of(balance))]
-            };
-            runs.map(own).collect()
-        };
-        let with_columns = |own: BalanceParts| {
-            let columns = columns(own.balance);
-            (own, columns)
-        };
-        parts.into_iter().map(with_columns).collect()
-    }
-
-    fn with_readings<T>(
-        data: &Data,
-        columns: &[Columns],
-        ask: impl FnOnce(&Readings<'_>) -> T,
-    ) -> T {
-        ask(&Readings {
-            data,
-            columns,
-            precision: &|_| 0.0,
-            others: &DMatrix::zeros(1, 1),
-            stride: 1,
-        })
-    }
-
-    /// Asks something of the search in every balance of a toy campaign.
+    /// Asks something of the search in every balance of a toy campaign: of the residual, with the noise as it starts.
     fn in_every_balance(seed: u64, ask: impl Fn(&Readings<'_>, &BalanceParts)) {
         let data = stop(Noise::TYPICAL, seed);
-        let all = balances(&data);
+        let law = Model::of_law(PEAK, CRITICAL);
+        let all = parts(&data, &Slopes::new(&data, &law));
         assert_eq!(all.len(), 3);
-        for (start, columns) in all {
-            with_readings(&data, &columns, |readings| ask(readings, &start));
+        for start in all {
+            let balance = start.balance;
+            let residual = |run: usize| {
+                let rows = rows_of(&data, &law, run);
+                vec![data.blocks[run][balance as usize].mean(rows.of(balance))]
+            };
+            let columns: Vec<Columns> = (0..data.series.len()).map(residual).collect();
+            let readings = Readings {
+                data: &data,
+                columns: &columns,
+                precision: &|_| 0.0,
+                others: &DMatrix::zeros(1, 1),
+                stride: 1,
+            };
+            ask(&readings, &start);
         }
     }
 
