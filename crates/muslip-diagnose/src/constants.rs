@@ -74,6 +74,8 @@ pub const FEW_RUNS_SURE: f64 = 0.9;
 pub const TIED: f64 = 0.99;
 /// Share of a name's likelihood from which another is hardly less likely: one softness apart, that is 1/e.
 pub const HARDLY_LESS: f64 = 0.37;
+/// Likelihood of what is rare as a share of that of what is common and looks the same.
+pub const RARE_SHARE: f64 = 0.05;
 /// Logarithm of the mean square error by which a prediction is clearly better.
 pub const PREDICTED_APART: f64 = 0.1;
 /// Share of a name's weight below which its alias, weighed beside it, is what its own form leaves, and a dependence too: forms

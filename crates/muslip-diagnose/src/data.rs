@@ -226,6 +226,12 @@ fn take_up_work(context: &mut Context, series: &[Series]) {
 }
 
 impl Data {
+    /// Makes up for what the level that is scaled falls short by.
+    pub fn scale_levels(&mut self, by: f64) {
+        let levels = self.series.iter_mut().flat_map(|s| &mut s.wheel_level);
+        levels.for_each(|level| *level *= by);
+    }
+
     /// Prepares all runs of a campaign.
     #[must_use]
     pub fn new(rig: &Rig, runs: &[Run]) -> Self {

@@ -75,9 +75,8 @@ pub fn figures(
         .zip(gradients)
         .map(|(reported, gradient)| {
             let g = nalgebra::DVector::from_vec(gradient);
-            let variance = g.dot(&(covariance * &g)).max(0.0);
-            let form = form_share(reported.name) * deviation(&reported, data);
-            let std = (variance + form * form).sqrt();
+            let own = g.dot(&(covariance * &g)).max(0.0).sqrt();
+            let std = with_form(own, &reported, data);
             let std = if std.is_finite() {
                 std
             } else {
@@ -86,6 +85,12 @@ pub fn figures(
             (reported, std)
         })
         .collect()
+}
+
+/// Standard deviation of a figure: its own, and what its form leaves open.
+#[must_use]
+pub fn with_form(own: f64, reported: &Reported<f64>, data: &Data) -> f64 {
+    own.hypot(form_share(reported.name) * deviation(reported, data))
 }
 
 /// Size of a figure against what it would be if nothing were missing: a radius of 0.313 m for one of 0.310 m is

@@ -56,6 +56,9 @@ pub struct Series {
     pub typical_dt: f64,
     /// Wheel speed in rad/s.
     pub wheel: Channel,
+    /// The wheel speed that an inertia in error scales, in rad/s: its slow part, which holds none of the residual's own
+    /// noise, and once names are decided on that times what it falls short by of the whole.
+    pub wheel_level: Vec<f64>,
     /// Vehicle speed in m/s.
     pub speed: Channel,
     /// Normal force in N.

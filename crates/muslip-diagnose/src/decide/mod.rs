@@ -7,8 +7,8 @@ mod trial;
 use finalists::{Screen, effort};
 use rank::rank;
 pub use rank::softness;
-use trial::{Before, could_stand, left_open, needed};
-pub use trial::{Claim, Trial, stands};
+use trial::{Before, left_open, needed};
+pub use trial::{Claim, Trial, could_stand, stands};
 
 use crate::chain::timing::Untold;
 use crate::constants::{ALIKE_NATS, DEPENDENCE_NATS, DEPENDENCE_SHARE, FORM_LEFT};
@@ -40,6 +40,13 @@ pub struct Decision {
 }
 
 impl Decision {
+    /// The chosen model judged anew, for other series of the same recordings.
+    #[must_use]
+    pub fn refitted(mut self, data: &Data) -> Self {
+        self.chosen = under_own_noise(data, self.chosen);
+        self
+    }
+
     /// The same without these names, by their entries: those that are left under what noise they leave.
     #[must_use]
     pub fn without(mut self, data: &Data, names: &[usize]) -> Self {

@@ -227,11 +227,11 @@ impl<'a> Before<'a> {
             Some((id, entry, term.parameters.as_slice()))
         });
         let own = term.is_none_or(|(_, entry, p)| data.catalogue.get(entry).owns(p, &data.context));
+        let real = in_force && predicts > REAL_MEMORY_PREDICTED && at_sensors.1 > REAL_MEMORY_T;
         let memory_s = term.and_then(|(id, entry, p)| {
             let memory_s = data.catalogue.get(entry).memory_s(p, &data.context)?;
-            Some((memory_s, least_memory_s(data, id, entry)))
+            Some((memory_s, least_memory_s(data, id, entry, real)))
         });
-        let real = in_force && predicts > REAL_MEMORY_PREDICTED && at_sensors.1 > REAL_MEMORY_T;
         // That a memory is real does not say whose it is: one of the tyre must outlast what it leaves to the chain.
         let of_tyre =
             term.is_some_and(|(_, entry, _)| data.catalogue.get(entry).guide().kind == Kind::Tyre);
@@ -306,14 +306,14 @@ fn squares_by_best_law(data: &Data, judged: &Judged) -> Vec<f64> {
 
 /// Shortest memory in s that is named: a filtered reading of the brake holds less noise than the reading itself, which
 /// looks like a short lag, so there its descriptor's smallest useful effect holds. None is shorter than the recording's
-/// step: how a reading changes between two samples is not known. An acceleration takes two steps to be seen, with the
-/// torque that enters at both.
-fn least_memory_s(data: &Data, id: Id, entry: usize) -> f64 {
+/// step, or half of it where it is real: how a reading changes between two samples is not known, but what it changes by
+/// from one to the next is. An acceleration takes two steps to be seen, with the torque that enters at both.
+fn least_memory_s(data: &Data, id: Id, entry: usize, real: bool) -> f64 {
     let (least_s, steps) = if id.balance() == Balance::Wheel {
         let smallest_s = (data.catalogue.get(entry).guide().smallest_size)(&data.context);
         (smallest_s, 2.0)
     } else {
-        (LEAST_MEMORY_S, 1.0)
+        (LEAST_MEMORY_S, if real { 0.5 } else { 1.0 })
     };
     least_s.max(steps * data.context.dt / data.averaged as f64)
 }

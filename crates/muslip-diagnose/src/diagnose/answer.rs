@@ -6,8 +6,8 @@ use crate::audit::Audit;
 use crate::campaign::{Rig, Run};
 use crate::chain::timing::{Timing, timed};
 use crate::data::Data;
-use crate::decide::{Decision, decide};
-use crate::innovations::hypothesis::Judged;
+use crate::decide::{Decision, Trial, could_stand, decide};
+use crate::innovations::hypothesis::{Judged, whole_over_slow};
 use crate::innovations::noise::BalanceParts;
 use crate::mechanism::{Balance, Id};
 use crate::model::TYRE_BASE;
@@ -76,7 +76,20 @@ impl<'a> Answer<'a> {
         answer.unsaid = answer.unlikely();
         let unsaid: Vec<usize> = answer.unsaid.iter().map(|own| own.0).collect();
         answer.decision = answer.decision.without(&answer.data, &unsaid);
-        Some(answer)
+        Some(answer.with_whole_level())
+    }
+
+    /// The same with all of the level that a name scales: its slow part alone, by which the name was decided on, makes an
+    /// inertia's error come out too large.
+    fn with_whole_level(mut self) -> Self {
+        let terms = &self.decision.chosen.model.terms;
+        let scales = |entry: usize| self.data.catalogue.get(entry).facts().scales_level;
+        if terms.iter().any(|term| scales(term.entry)) {
+            let by = whole_over_slow(&self.data, &self.decision.chosen);
+            self.data.scale_levels(by);
+            self.decision = self.decision.refitted(&self.data);
+        }
+        self
     }
 
     /// Its names that work through the force.
@@ -98,6 +111,17 @@ impl<'a> Answer<'a> {
                 }
             })
             .collect()
+    }
+
+    /// Whether a memory that works through the force was as good as one that stands but for how alike the runs speak for it.
+    pub(super) fn could_remember(&self) -> bool {
+        let through_force = |trial: &Trial| {
+            trial
+                .mechanism()
+                .is_some_and(|(_, entry)| self.data.catalogue.get(entry).facts().through_force)
+        };
+        let mut trials = self.decision.rounds.iter().flatten();
+        trials.any(|trial| trial.remembers && through_force(trial) && could_stand(trial))
     }
 
     /// Whether it says that nothing is missing.

@@ -6,10 +6,10 @@ use super::answer::Answer;
 use crate::audit::Timing;
 use crate::constants::{
     AUDITED, FEW_RUNS_SURE, FORM_OF_DELAY_S, HARDLY_LESS, LEAST_CONFIDENCE, LEAST_DELAY_S,
-    PREDICTED_APART, SURE_DELAY, TIED, VAGUE_DELAY_S,
+    PREDICTED_APART, RARE_SHARE, SURE_DELAY, TIED, VAGUE_DELAY_S,
 };
 use crate::decide::{Claim, Trial, softness, stands};
-use crate::figures::figures;
+use crate::figures::{figures, with_form};
 use crate::innovations::dependence::Dependence;
 use crate::mechanism::{Id, Reported, Speed};
 use crate::number::finite_or_zero;
@@ -85,7 +85,20 @@ impl Answer<'_> {
         let mut rounds = self.decision.rounds.iter().rev();
         let (trial, round) =
             rounds.find_map(|round| Some((round.iter().find(of_entry)?, round)))?;
-        let (share, others) = shares(trial, round);
+        let (mut share, mut others) = shares(trial, round);
+        let double = self
+            .data
+            .catalogue
+            .get(entry)
+            .rare_double(&self.data.series);
+        if let Some(double) = double.filter(|id| others.iter().all(|o| o.id != id.as_str())) {
+            others.push(Alternative {
+                id: double.as_str(),
+                confidence: RARE_SHARE * share,
+            });
+            others.sort_by(|a, b| b.confidence.total_cmp(&a.confidence));
+            share /= 1.0 + RARE_SHARE;
+        }
         let sureness = Sureness {
             share,
             confidence: confidence(share, trial.steadiness(), self.data.series.len()),
@@ -183,7 +196,10 @@ impl Answer<'_> {
             balance: id.balance().as_str(),
             statement: sentence(&mechanism.statement(core::slice::from_ref(&reported), &[value])),
             equation: mechanism.equation().to_owned(),
-            parameters: vec![ReportedParameter::new(&reported, std)],
+            parameters: vec![ReportedParameter::new(
+                &reported,
+                with_form(std, &reported, &self.data),
+            )],
             evidence: Evidence {
                 delta_bic: z * z,
                 // Not measured: the timing is fitted to all runs together.

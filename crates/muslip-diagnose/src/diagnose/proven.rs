@@ -11,12 +11,19 @@ use crate::proof::Predicted;
 use crate::repaired::{Predicting, Repaired};
 use crate::split::Split;
 
+/// What the argument comes to without what is kept.
+struct Again {
+    names: Vec<NameOfForce>,
+    /// Whether a memory is among them, or would be were fewer runs as even as all of them.
+    remembers: bool,
+}
+
 /// What the argument came to, and how the model that it comes to without what is kept predicts that.
 pub(super) struct Proven<'a> {
     pub(super) answer: Answer<'a>,
     kept: Split,
-    /// What the argument without what is kept names; nothing where it could not be held.
-    again: Option<Vec<NameOfForce>>,
+    /// What the argument without what is kept comes to; nothing where it could not be held.
+    again: Option<Again>,
     found: Repaired,
     predicted: Vec<Predicted>,
     fit: Fit,
@@ -46,7 +53,11 @@ impl<'a> Proven<'a> {
             let not_asked = answer.not_asked.clone();
             let again = Answer::of(given, &kept, audit, Some(&answer.timing), not_asked);
             again.map_or_else(Predicting::default, |again| {
-                names = Some(again.names_of_force());
+                let of_force = again.names_of_force();
+                names = Some(Again {
+                    remembers: of_force.iter().any(|name| name.remembers) || again.could_remember(),
+                    names: of_force,
+                });
                 again.repaired().predicting()
             })
         };
@@ -80,8 +91,7 @@ impl<'a> Proven<'a> {
     /// Names that the argument without what is kept speaks against.
     pub(super) fn refuted(&self) -> Vec<Id> {
         let named = self.answer.names_of_force();
-        let again = self.again.as_deref();
-        again.map_or_else(Vec::new, |again| {
+        self.again.as_ref().map_or_else(Vec::new, |again| {
             refuted(&named, again, self.predicts_worse())
         })
     }
@@ -154,21 +164,20 @@ impl<'a> Proven<'a> {
     }
 }
 
-/// Names that the same argument without what is kept speaks against: a memory where it comes to none at all, or predicts
+/// Names that the same argument without what is kept speaks against: a memory where it knows of none at all, or predicts
 /// what is kept worse than the law does, for the chain's own kernels do much of what a memory does; any other where it
 /// does not come to that, nor to what is hardly likelier than that, but to another in its place that is no memory. What all
 /// recordings together make sure is not refuted by fewer.
-fn refuted(named: &[NameOfForce], again: &[NameOfForce], worse: bool) -> Vec<Id> {
+fn refuted(named: &[NameOfForce], again: &Again, worse: bool) -> Vec<Id> {
     let has = |names: &[NameOfForce], id: Id| names.iter().any(|name| name.id == id);
     let other = |name: &NameOfForce| !name.remembers && !has(named, name.id);
-    let another = again.iter().any(other);
-    let remembers = again.iter().any(|name| name.remembers);
-    let rivals = |id: Id| again.iter().any(|name| name.rivals.contains(&id));
+    let another = again.names.iter().any(other);
+    let rivals = |id: Id| again.names.iter().any(|name| name.rivals.contains(&id));
     let against = |name: &&NameOfForce| {
         let contradicted = if name.remembers {
-            worse || !remembers
+            worse || !again.remembers
         } else {
-            another && !has(again, name.id) && !rivals(name.id)
+            another && !has(&again.names, name.id) && !rivals(name.id)
         };
         contradicted && name.confidence < BEYOND_REFUTATION
     };
@@ -188,6 +197,14 @@ mod tests {
         }
     }
 
+    fn refuted(named: &[NameOfForce], again: &[NameOfForce], worse: bool) -> Vec<Id> {
+        let again = Again {
+            names: again.to_vec(),
+            remembers: again.iter().any(|name| name.remembers),
+        };
+        super::refuted(named, &again, worse)
+    }
+
     const LAG: NameOfForce = name(Id::ForceLag, true);
     const RELAXATION: NameOfForce = name(Id::RelaxationLength, true);
     const WEAR: NameOfForce = name(Id::WearDrift, false);
@@ -205,6 +222,16 @@ mod tests {
             ..LAG
         };
         assert!(refuted(&[sure], &[], true).is_empty());
+    }
+
+    #[test]
+    fn a_memory_that_fewer_runs_show_less_evenly_is_not_refuted() {
+        let again = Again {
+            names: Vec::new(),
+            remembers: true,
+        };
+        assert!(super::refuted(&[LAG], &again, false).is_empty());
+        assert_eq!(super::refuted(&[LAG], &again, true), [Id::ForceLag]);
     }
 
     #[test]

@@ -220,7 +220,7 @@ fn wheel<T: Number>(
         let beyond = tyre.read_off.as_ref().map_or(zero, |off| off[k]);
         let off = tyre.omega[k] - series.wheel.smooth[k] + beyond;
         let off = if off.value().is_finite() { off } else { zero };
-        acting.inertia_change * (context.inertia * series.wheel.slow[k])
+        acting.inertia_change * (context.inertia * series.wheel_level[k])
             + (off + series.wheel.raw[k]) * context.inertia
     };
     integrated(series, slowing, level)

@@ -166,6 +166,8 @@ pub struct Facts {
     pub drawn_over: Against,
     /// Which parameter is its size, where one is: at its null the mechanism is absent.
     pub amplitude: Option<usize>,
+    /// Whether it scales a level that is recorded, which is made of its slow part while names are decided on.
+    pub scales_level: bool,
     /// Whether it is rare beside what recordings hardly tell it from.
     pub rare: bool,
     /// Whether a measuring chain leaves what looks like it: kernels that differ, slip's noise that flattens the curve, the
@@ -189,6 +191,7 @@ impl Facts {
             late: None,
             drawn_over: Against::Time,
             amplitude: Some(0),
+            scales_level: false,
             rare: false,
             fed_by_chain: false,
         }
@@ -245,6 +248,10 @@ pub trait Describe: Send + Sync {
     }
     /// Another mechanism that these parameters say as well, and that claims less.
     fn says_as_well(&self, _parameters: &[f64], _context: &Context) -> Option<Id> {
+        None
+    }
+    /// Another mechanism, rare beside it, that nothing in these recordings tells from it.
+    fn rare_double(&self, _series: &[Series]) -> Option<Id> {
         None
     }
     /// Whether it goes by the order of the campaign's runs: a recording whose place in it is not known is predicted

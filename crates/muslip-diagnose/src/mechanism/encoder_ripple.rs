@@ -32,6 +32,11 @@ impl Describe for EncoderRipple {
     fn starts(&self, search: &Search<'_>) -> Vec<Vec<f64>> {
         self.form.starts(search.context)
     }
+    fn rare_double(&self, series: &[Series]) -> Option<Id> {
+        // A wheel whose radius varies turns as this reads, but for what the brake would show.
+        let no_wheel_balance = series.iter().all(|s| s.wheel_balance.is_empty());
+        no_wheel_balance.then_some(Id::RunOut)
+    }
     fn statement(&self, reported: &[Reported<f64>], _p: &[f64]) -> String {
         format!(
             "the wheel speed reading varies once a revolution by {:.3} % of itself",

@@ -9,6 +9,7 @@ impl Describe for WheelInertia {
     fn facts(&self) -> Facts {
         Facts {
             drawn_over: Against::WheelAcceleration,
+            scales_level: true,
             ..Facts::of(
                 Id::WheelInertia,
                 Stage::Wheel,

@@ -4,6 +4,7 @@
 mod columns;
 mod filtered;
 mod judged;
+mod level;
 mod place;
 mod sizes;
 mod unseen;
@@ -13,6 +14,7 @@ use place::{Known, Place};
 pub use columns::table_grams;
 pub use filtered::Noise;
 pub use judged::Judged;
+pub use level::whole_over_slow;
 pub use sizes::{Effort, capped, noise_stride};
 pub use unseen::Unseen;
 
@@ -146,5 +148,38 @@ mod tests {
             );
         }
         assert!(tried >= 3, "{tried}");
+    }
+
+    #[test]
+    fn an_inertia_s_error_is_right_by_all_of_the_level() {
+        // The rig file's is a sixth less than the wheel's; it comes and goes four times, slowly.
+        let noise = Noise {
+            wheel: 0.02,
+            ..Noise::TYPICAL
+        };
+        let mut data = stop(noise, 4);
+        data.context.inertia = 1.0;
+        let entries = data.catalogue.entries();
+        let entry = entries.iter().position(|m| m.id() == Id::WheelInertia);
+        let entry = entry.unwrap();
+        let judged = |data: &Data| {
+            let mut model = settled(data).model;
+            model.terms.push(Term {
+                entry,
+                parameters: vec![0.1],
+            });
+            judge(data, &model, &[], Guess::None, EFFORT).unwrap()
+        };
+        let slow = judged(&data);
+        let by = whole_over_slow(&data, &slow);
+        assert!(by > 1.0 && by < 1.1, "{by}");
+        data.scale_levels(by);
+        let error = judged(&data).model.terms[0].parameters[0];
+        assert!((error - 0.2).abs() < 0.02, "{error} {by}");
+        // Where the level lacks a half, its coefficient is twice as large.
+        data.scale_levels(0.5 / by);
+        let twice = judged(&data).model.terms[0].parameters[0];
+        let slow = slow.model.terms[0].parameters[0];
+        assert!((twice / slow - 2.0).abs() < 0.05, "{twice} {slow}");
     }
 }
