@@ -85,20 +85,11 @@ impl Answer<'_> {
         let mut rounds = self.decision.rounds.iter().rev();
         let (trial, round) =
             rounds.find_map(|round| Some((round.iter().find(of_entry)?, round)))?;
-        let (mut share, mut others) = shares(trial, round);
-        let double = self
-            .data
-            .catalogue
-            .get(entry)
-            .rare_double(&self.data.series);
-        if let Some(double) = double.filter(|id| others.iter().all(|o| o.id != id.as_str())) {
-            others.push(Alternative {
-                id: double.as_str(),
-                confidence: RARE_SHARE * share,
-            });
-            others.sort_by(|a, b| b.confidence.total_cmp(&a.confidence));
-            share /= 1.0 + RARE_SHARE;
-        }
+        let mechanism = self.data.catalogue.get(entry);
+        let (share, others) = beside_double(
+            shares(trial, round),
+            mechanism.rare_double(&self.data.series),
+        );
         let sureness = Sureness {
             share,
             confidence: confidence(share, trial.steadiness(), self.data.series.len()),
@@ -281,6 +272,23 @@ fn shares(trial: &Trial, round: &[Trial]) -> (f64, Vec<Alternative>) {
     (own_share, others)
 }
 
+/// The same beside what is rare and looks the same, where it was not itself tried.
+fn beside_double(
+    (share, mut others): (f64, Vec<Alternative>),
+    double: Option<Id>,
+) -> (f64, Vec<Alternative>) {
+    let Some(double) = double.filter(|id| others.iter().all(|other| other.id != id.as_str()))
+    else {
+        return (share, others);
+    };
+    others.push(Alternative {
+        id: double.as_str(),
+        confidence: RARE_SHARE * share,
+    });
+    others.sort_by(|a, b| b.confidence.total_cmp(&a.confidence));
+    (share / (1.0 + RARE_SHARE), others)
+}
+
 /// How sure a name with this share is: by what so many runs can show, and how alike they speak for it.
 fn confidence(share: f64, steadiness: f64, runs: usize) -> f64 {
     let steady = 1.0 - (-0.8 * (steadiness - 0.5)).exp();
@@ -310,6 +318,21 @@ mod tests {
         assert!((confidence(1.0, half, 1) - 0.351_349).abs() < 1e-6);
         assert!((confidence(0.5, even, 1) - 0.351_349).abs() < 1e-6);
         assert!((confidence(1.0, 0.0, 9) - 0.01).abs() < 1e-12, "clamped");
+    }
+
+    #[test]
+    fn what_is_rare_and_looks_the_same_is_said_once_and_takes_little() {
+        let lag = || Alternative {
+            id: Id::ForceLag.as_str(),
+            confidence: 0.01,
+        };
+        let ids = |all: &[Alternative]| all.iter().map(|own| own.id).collect::<Vec<_>>();
+        let (share, others) = beside_double((0.9, vec![lag()]), Some(Id::RunOut));
+        assert_eq!(ids(&others), ["run_out", "force_lag"]);
+        assert!((share - 0.857_142_86).abs() < 1e-6, "{share}");
+        let tried = beside_double((share, others), Some(Id::RunOut));
+        assert_eq!(ids(&tried.1), ["run_out", "force_lag"]);
+        assert_eq!(beside_double((0.9, vec![lag()]), None).0, 0.9);
     }
 
     #[test]
