@@ -57,14 +57,14 @@ impl Timing {
         let late_receiver = early(&self.wheel) && early(&self.brake) && !early(&self.vehicle);
         let all = [self.wheel, self.brake, self.vehicle];
         let asked = &all[..if late_receiver { 2 } else { 3 }];
-        // One channel alone says as little of the drag as the drag does of it.
-        let told: Vec<f64> = asked.iter().filter(known).map(|l| -l.value).collect();
-        let late = told.iter().copied().fold(f64::INFINITY, f64::min);
+        // A brake alone says as little of the drag as the drag does of it.
+        let speed = [self.wheel, self.vehicle].iter().any(|l| known(&l));
+        let told = asked.iter().filter(known).map(|l| -l.value);
+        let late = told.fold(f64::INFINITY, f64::min);
         let alike =
             |l: &Late| (-l.value - late).abs() < ALIKE_LATE * late + ALIKE_LATE_S + 2.0 * l.std;
         let heard = |l: &&Late| l.std < HEARD_S;
-        (told.len() > 1 && late > LEAST_DRAG_LATE_S && asked.iter().filter(heard).all(alike))
-            .then_some(late)
+        (speed && late > LEAST_DRAG_LATE_S && asked.iter().filter(heard).all(alike)).then_some(late)
     }
 
     /// Leaves the drag as late as it is against all others.
@@ -487,32 +487,13 @@ mod tests {
     }
 
     #[test]
-    fn a_brake_that_is_late_speaks_against_a_late_drag_however_vague() {
-        let mut vague_brake = timing(-0.013, -0.013, 0.032);
-        vague_brake.brake.std = 0.003;
-        assert_eq!(vague_brake.drag_late(), None);
+    fn a_vehicle_speed_that_is_late_speaks_against_a_late_drag_however_vague() {
+        let mut no_brake = timing(-0.013, 0.032, 0.0);
+        (no_brake.vehicle.std, no_brake.brake.std) = (0.003, 0.02);
+        assert_eq!(no_brake.drag_late(), None);
         // As vague as this it says nothing.
-        vague_brake.brake.std = 0.03;
-        assert_eq!(vague_brake.drag_late(), Some(0.013));
-    }
-
-    #[test]
-    fn one_channel_alone_does_not_make_the_drag_late() {
-        let unknown = Late {
-            value: 0.0,
-            std: f64::INFINITY,
-        };
-        let wheel_alone = Timing {
-            vehicle: unknown,
-            brake: unknown,
-            ..timing(-0.010, 0.0, 0.0)
-        };
-        assert_eq!(wheel_alone.drag_late(), None);
-        let with_brake = Timing {
-            vehicle: unknown,
-            ..timing(-0.010, 0.0, -0.011)
-        };
-        assert_eq!(with_brake.drag_late(), Some(0.010));
+        no_brake.vehicle.std = 0.03;
+        assert_eq!(no_brake.drag_late(), Some(0.013));
     }
 
     #[test]
