@@ -226,10 +226,11 @@ fn take_up_work(context: &mut Context, series: &[Series]) {
 }
 
 impl Data {
-    /// Makes up for what the level that is scaled falls short by.
-    pub fn scale_levels(&mut self, by: f64) {
-        let levels = self.series.iter_mut().flat_map(|s| &mut s.wheel_level);
-        levels.for_each(|level| *level *= by);
+    /// Makes the wheel speed that an inertia scales so many times its slow part.
+    pub fn scale_slow_wheel(&mut self, by: f64) {
+        for series in &mut self.series {
+            series.slow_wheel_lacks = by - 1.0;
+        }
     }
 
     /// Prepares all runs of a campaign.

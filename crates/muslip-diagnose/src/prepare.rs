@@ -172,13 +172,11 @@ pub fn prepare(
     } else {
         (0.0, Vec::new())
     };
-    let wheel = channel(time, omega, &continuous, omega_sigma, &reach);
     let mut series = Series {
         name: run.name.clone(),
         time: time.clone(),
         typical_dt,
-        wheel_level: wheel.slow.clone(),
-        wheel,
+        wheel: channel(time, omega, &continuous, omega_sigma, &reach),
         speed: channel(time, v, &continuous, v_sigma, &slow_reach),
         load: channel(time, load, &continuous, load_sigma, &reach),
         drag,

@@ -56,9 +56,9 @@ pub struct Series {
     pub typical_dt: f64,
     /// Wheel speed in rad/s.
     pub wheel: Channel,
-    /// The wheel speed that an inertia in error scales, in rad/s: its slow part, which holds none of the residual's own
-    /// noise, and once names are decided on that times what it falls short by of the whole.
-    pub wheel_level: Vec<f64>,
+    /// What the slow part of the wheel speed lacks of the whole, as a share of itself: an inertia in error scales the whole.
+    /// Nothing until names are decided on.
+    pub slow_wheel_lacks: f64,
     /// Vehicle speed in m/s.
     pub speed: Channel,
     /// Normal force in N.

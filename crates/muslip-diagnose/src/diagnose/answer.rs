@@ -86,7 +86,7 @@ impl<'a> Answer<'a> {
         let scales = |entry: usize| self.data.catalogue.get(entry).facts().scales_level;
         if terms.iter().any(|term| scales(term.entry)) {
             let by = whole_over_slow(&self.data, &self.decision.chosen);
-            self.data.scale_levels(by);
+            self.data.scale_slow_wheel(by);
             self.decision = self.decision.refitted(&self.data);
         }
         self

@@ -215,12 +215,13 @@ fn wheel<T: Number>(
         let rolling = tyre.rolling_moment.as_ref().map_or(zero, |r| r[k]);
         brake + acting.opposing[k] + rolling - force.at(acting.gain_change, k) * context.radius
     };
+    let whole = 1.0 + series.slow_wheel_lacks;
     let level = |k: usize| {
         // What the reading is off by, an encoder's ripple, is off in the level as well.
         let beyond = tyre.read_off.as_ref().map_or(zero, |off| off[k]);
         let off = tyre.omega[k] - series.wheel.smooth[k] + beyond;
         let off = if off.value().is_finite() { off } else { zero };
-        acting.inertia_change * (context.inertia * series.wheel_level[k])
+        acting.inertia_change * (context.inertia * (whole * series.wheel.slow[k]))
             + (off + series.wheel.raw[k]) * context.inertia
     };
     integrated(series, slowing, level)

@@ -1,6 +1,6 @@
 //! The wheel speed reading varies once (or a few times) a revolution.
 
-use super::once_a_turn::Form;
+use super::once_a_turn::{Form, radius_reads_as_ripple};
 use super::prelude::*;
 
 /// Largest amplitude of an order, as a share of the wheel speed.
@@ -33,9 +33,7 @@ impl Describe for EncoderRipple {
         self.form.starts(search.context)
     }
     fn rare_double(&self, series: &[Series]) -> Option<Id> {
-        // A wheel whose radius varies turns as this reads, but for what the brake would show.
-        let no_wheel_balance = series.iter().all(|s| s.wheel_balance.is_empty());
-        no_wheel_balance.then_some(Id::RunOut)
+        radius_reads_as_ripple(series).then_some(Id::RunOut)
     }
     fn statement(&self, reported: &[Reported<f64>], _p: &[f64]) -> String {
         format!(

@@ -16,6 +16,12 @@ pub struct Form {
     pub phase_per_run: bool,
 }
 
+/// Whether no brake tells a rolling radius that varies from an encoder that ripples: what acts on the wheel is not known.
+#[must_use]
+pub fn radius_reads_as_ripple(series: &[Series]) -> bool {
+    series.iter().all(|s| s.wheel_balance.is_empty())
+}
+
 /// All forms.
 pub const FORMS: [Form; 3] = [
     Form {

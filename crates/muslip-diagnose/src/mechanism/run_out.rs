@@ -1,6 +1,6 @@
 //! Drag varies once (or a few times) a wheel revolution.
 
-use super::once_a_turn::Form;
+use super::once_a_turn::{Form, radius_reads_as_ripple};
 use super::prelude::*;
 
 /// Largest amplitude of an order, as a share of the drag.
@@ -58,8 +58,8 @@ impl Describe for RunOut {
         self.form.parameters(context, limit)
     }
     fn starts(&self, search: &Search<'_>) -> Vec<Vec<f64>> {
-        // Without the wheel's balance a radius that varies is the same as an encoder that ripples, which is common.
-        if self.of == Of::Radius && search.series.iter().all(|s| s.wheel_balance.is_empty()) {
+        // The ripple, which is common, is offered instead.
+        if self.of == Of::Radius && radius_reads_as_ripple(search.series) {
             return Vec::new();
         }
         self.form.starts(search.context)

@@ -152,7 +152,7 @@ mod tests {
 
     #[test]
     fn an_inertia_s_error_is_right_by_all_of_the_level() {
-        // The rig file's is a sixth less than the wheel's; it comes and goes four times, slowly.
+        // The wheel's is a fifth more than the rig file's.
         let noise = Noise {
             wheel: 0.02,
             ..Noise::TYPICAL
@@ -173,11 +173,11 @@ mod tests {
         let slow = judged(&data);
         let by = whole_over_slow(&data, &slow);
         assert!(by > 1.0 && by < 1.1, "{by}");
-        data.scale_levels(by);
+        data.scale_slow_wheel(by);
         let error = judged(&data).model.terms[0].parameters[0];
         assert!((error - 0.2).abs() < 0.02, "{error} {by}");
         // Where the level lacks a half, its coefficient is twice as large.
-        data.scale_levels(0.5 / by);
+        data.scale_slow_wheel(0.5);
         let twice = judged(&data).model.terms[0].parameters[0];
         let slow = slow.model.terms[0].parameters[0];
         assert!((twice / slow - 2.0).abs() < 0.05, "{twice} {slow}");
