@@ -13,5 +13,5 @@ pub mod rows;
 pub mod screen;
 pub mod slip;
 #[cfg(test)]
-mod toy;
+pub mod toy;
 pub mod whiten;

@@ -9,6 +9,7 @@ use crate::data::{Catalogue, Data, Listed};
 use crate::mechanism::{Balance, Context, Stage, State};
 use crate::model::{Model, acting, tyre};
 use crate::number::Number;
+use crate::prepare::mean_twice_about;
 use crate::series::{Channel, Series};
 
 /// Rows of one run by balance, in the order tyre, wheel, vehicle.
@@ -81,6 +82,27 @@ pub fn quiet_force(series: &Series, law: &[f64]) -> Vec<f64> {
             _ => series.drag_smooth[k],
         })
         .collect()
+}
+
+/// Reach in s of the means of what a law's force is off by.
+const OFF_REACH_S: f64 = 0.01;
+
+/// The same with what the reading says that the law is off by: a few percent, which integrated are more than the speeds'
+/// noise. It is taken over means, for the reading's own noise must not be in it.
+fn calibrated_force(series: &Series, law: &[f64]) -> Vec<f64> {
+    let by_law = quiet_force(series, law);
+    let read = series.drag_smooth.iter().zip(&by_law);
+    let off: Vec<f64> = read.map(|(read, law)| read - law).collect();
+    let segments = if series.wheel_balance.is_empty() {
+        &series.vehicle_balance
+    } else {
+        &series.wheel_balance
+    };
+    let mut force = mean_twice_about(&series.time, &off, segments, OFF_REACH_S);
+    for (force, law) in force.iter_mut().zip(by_law) {
+        *force += law;
+    }
+    force
 }
 
 /// Rows of a model. Terms act on every balance that they touch.
@@ -179,7 +201,7 @@ impl<'a, T: Number> Force<'a, T> {
         Self {
             series,
             added,
-            quiet: quiet_force(series, &by_law),
+            quiet: calibrated_force(series, &by_law),
         }
     }
 
@@ -236,7 +258,7 @@ fn vehicle<T: Number>(
     // A mass in error scales what slows it: by the model's force, for the speed's own errors are in the level.
     let lighter = T::constant(1.0) / (acting.inertia_change + 1.0) - 1.0;
     let slowing = |k: usize| {
-        let own = force.quiet(k) + acting.opposing[k];
+        let own = force.quiet(k) / (acting.gain_change + 1.0) + acting.opposing[k];
         force.at(acting.gain_change, k) + acting.opposing[k] + lighter * own
     };
     let level = |k: usize| T::constant(context.mass * series.speed.raw[k]);
@@ -262,4 +284,78 @@ fn integrated<T: Number>(
             level(k) + sum
         })
         .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::innovations::hypothesis::{Guess, judge};
+    use crate::innovations::toy::{EFFORT, Noise, settled, stop};
+    use crate::mechanism::Id;
+    use crate::model::Term;
+
+    /// Root mean square over the stretches of the wheel's balance.
+    fn rms(series: &Series, x: impl Fn(usize) -> f64) -> f64 {
+        let samples = series.wheel_balance.iter().flat_map(Clone::clone);
+        let squares: Vec<f64> = samples.map(|k| x(k).powi(2)).collect();
+        (squares.iter().sum::<f64>() / squares.len() as f64).sqrt()
+    }
+
+    #[test]
+    fn what_the_reading_says_of_the_law_mends_the_law_and_brings_little_noise() {
+        let data = stop(Noise::TYPICAL, 4);
+        let exact = stop(
+            Noise {
+                wheel: 0.0,
+                drag: 0.0,
+                load: 0.0,
+                torque: 0.0,
+            },
+            4,
+        );
+        let (series, truth) = (&data.series[0], &exact.series[0].drag);
+        // The law is exact: what is brought in is the reading's noise.
+        let exact = calibrated_force(series, truth);
+        let noise = rms(series, |k| exact[k] - truth[k]);
+        assert!(noise < 0.5 * series.drag_sigma, "{noise}");
+        // It is off by a tenth, this way and that four times a second.
+        let off = |k: usize| 0.1 * truth[k] * (25.0 * series.time[k]).sin();
+        let law: Vec<f64> = (0..series.len()).map(|k| truth[k] + off(k)).collect();
+        let mended = calibrated_force(series, &law);
+        let left = rms(series, |k| mended[k] - truth[k]);
+        assert!(
+            left < 0.15 * rms(series, off),
+            "{left} {}",
+            rms(series, off)
+        );
+    }
+
+    #[test]
+    fn a_scale_of_the_drag_in_error_is_right_beside_a_law_that_is_off() {
+        let noise = Noise {
+            wheel: 0.02,
+            ..Noise::TYPICAL
+        };
+        let mut data = stop(noise, 4);
+        // What the law's slip is made of is off by turns, by up to a fifth of the slip at the peak.
+        let series = &mut data.series[0];
+        for (omega, time) in series.wheel.smooth.iter_mut().zip(&series.time) {
+            *omega *= 1.0 + 0.024 * (25.0 * time).sin();
+        }
+        for reading in [&mut series.drag, &mut series.drag_smooth] {
+            for force in reading {
+                *force *= 1.2;
+            }
+        }
+        let entries = data.catalogue.entries();
+        let entry = entries.iter().position(|m| m.id() == Id::ForceGain);
+        let mut model = settled(&data).model;
+        model.terms.push(Term {
+            entry: entry.unwrap(),
+            parameters: vec![0.0],
+        });
+        let judged = judge(&data, &model, &[], Guess::None, EFFORT).unwrap();
+        let gain = 1.0 + judged.model.terms[0].parameters[0];
+        assert!((gain - 1.2).abs() < 0.02, "{gain}");
+    }
 }

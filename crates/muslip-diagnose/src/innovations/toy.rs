@@ -10,8 +10,8 @@ use crate::campaign::{Rig, Run};
 use crate::data::Data;
 use crate::model::Model;
 
-pub(super) const PEAK: f64 = 0.8;
-pub(super) const CRITICAL: f64 = 0.12;
+pub const PEAK: f64 = 0.8;
+pub const CRITICAL: f64 = 0.12;
 const LOAD_N: f64 = 4000.0;
 const STEPS: usize = 2000;
 const STEP_S: f64 = 5e-3;
@@ -20,16 +20,16 @@ const INNER: usize = 10;
 
 /// Standard deviations of the channels' white noise.
 #[derive(Clone, Copy)]
-pub(super) struct Noise {
-    pub(super) wheel: f64,
-    pub(super) drag: f64,
-    pub(super) load: f64,
-    pub(super) torque: f64,
+pub struct Noise {
+    pub wheel: f64,
+    pub drag: f64,
+    pub load: f64,
+    pub torque: f64,
 }
 
 impl Noise {
     /// Of a common measuring chain: rad/s, N, N, N m.
-    pub(super) const TYPICAL: Self = Self {
+    pub const TYPICAL: Self = Self {
         wheel: 0.3,
         drag: 15.0,
         load: 40.0,
@@ -39,20 +39,20 @@ impl Noise {
 
 /// What stands between a stop and its recording, each a time constant in s.
 #[derive(Clone, Copy, Default)]
-pub(super) struct Lags {
+pub struct Lags {
     /// Of two poles of the wheel speed's sensor, the delay of both taken off.
-    pub(super) wheel_sensor_s: f64,
+    pub wheel_sensor_s: f64,
     /// Of the brake behind its reading.
-    pub(super) brake_s: f64,
+    pub brake_s: f64,
 }
 
 /// A quarter car whose brake comes and goes four times while it coasts, free rolling in between.
-pub(super) fn stop(noise: Noise, seed: u64) -> Data {
+pub fn stop(noise: Noise, seed: u64) -> Data {
     stop_with(noise, Lags::default(), seed)
 }
 
 /// The same with lags.
-pub(super) fn stop_with(noise: Noise, lags: Lags, seed: u64) -> Data {
+pub fn stop_with(noise: Noise, lags: Lags, seed: u64) -> Data {
     let rig = Rig {
         radius_m: 0.3,
         wheel_inertia_kg_m2: 1.2,
@@ -122,14 +122,14 @@ pub(super) fn stop_with(noise: Noise, lags: Lags, seed: u64) -> Data {
 }
 
 /// How hard a toy is tried.
-pub(super) const EFFORT: Effort = Effort {
+pub const EFFORT: Effort = Effort {
     steps: 8,
     noise_steps: 20,
     noise_stride: 1,
 };
 
 /// The law alone with its noise.
-pub(super) fn settled(data: &Data) -> Judged {
+pub fn settled(data: &Data) -> Judged {
     let law = Model::of_law(PEAK, CRITICAL);
     let mut base = judge(data, &law, &[], Guess::None, EFFORT).unwrap();
     for _ in 0..3 {
