@@ -49,6 +49,11 @@ pub const CLEARLY_PREDICTED: f64 = 0.25;
 /// sensors' noise are uneven: to a third.
 pub const LINED_UP_PREDICTED: f64 = 1.0;
 
+// What stood before.
+
+/// Least share of what spoke for a name that still has to once another was taken up.
+pub const STILL_SPEAKS: f64 = 0.5;
+
 // Names that gain alike.
 
 /// Gains that differ by less are alike, nats.

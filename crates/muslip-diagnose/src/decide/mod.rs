@@ -11,7 +11,7 @@ use trial::{Before, left_open, needed};
 pub use trial::{Claim, Trial, could_stand, stands};
 
 use crate::chain::timing::Untold;
-use crate::constants::{ALIKE_NATS, DEPENDENCE_NATS, DEPENDENCE_SHARE, FORM_LEFT};
+use crate::constants::{ALIKE_NATS, DEPENDENCE_NATS, DEPENDENCE_SHARE, FORM_LEFT, STILL_SPEAKS};
 use crate::data::Data;
 use crate::innovations::dependence::{self, Dependence};
 use crate::innovations::hypothesis::{Guess, Judged, judge, judge_added};
@@ -100,6 +100,8 @@ struct TakenUp {
     names: Vec<(Id, f64)>,
     /// What all of it gained at the sensors' noise, in nats.
     at_sensors: f64,
+    /// Names that stood beside what was taken up before, and how much spoke for each.
+    stood: Vec<(Id, f64)>,
 }
 
 impl TakenUp {
@@ -107,6 +109,17 @@ impl TakenUp {
         self.at_sensors += trial.at_sensors.0.max(0.0);
         let name = trial.mechanism().map(|(id, _)| (id, trial.weight()));
         self.names.extend(name);
+    }
+
+    /// Whether a name stood before, and what was taken up since has taken little of what speaks for it: of two effects the
+    /// order in which they are found is an accident.
+    fn still_stands(&self, trial: &Trial) -> bool {
+        let Some((id, _)) = trial.mechanism() else {
+            return false;
+        };
+        let as_much =
+            |&(other, weight): &(Id, f64)| other == id && trial.weight() > STILL_SPEAKS * weight;
+        could_stand(trial) && self.stood.iter().any(as_much)
     }
 }
 
@@ -124,7 +137,7 @@ fn left_by_form(trial: &Trial, before: &TakenUp) -> bool {
 /// The trial that is taken up: a mechanism, unless a free dependence accounts for much more in the same balance. One
 /// in another balance is no other account of it, and has its turn later.
 fn next<'a>(data: &Data, trials: &'a [Trial], before: &TakenUp) -> Option<&'a Trial> {
-    let own = |t: &&Trial| stands(t) && !left_by_form(t, before);
+    let own = |t: &&Trial| (stands(t) || before.still_stands(t)) && !left_by_form(t, before);
     let standing = || trials.iter().filter(own);
     let Some(named) = standing().find(|t| t.mechanism().is_some()) else {
         return standing().next();
@@ -282,6 +295,9 @@ pub fn decide(data: &Data, base: Judged, excluded: &[Id], untold: Untold) -> Dec
         rounds.push(trials);
         let Some(trial) = best else { break };
         taken_up.add(&trial);
+        let standing = rounds.iter().flatten().filter(|t| stands(t));
+        let named = standing.filter_map(|t| Some((t.mechanism()?.0, t.weight())));
+        taken_up.stood = named.collect();
         chosen = settled(data, under_own_noise(data, trial.judged));
     }
     if chosen.model.terms.len() > 1 {
@@ -369,4 +385,57 @@ fn without_least_needed(data: &Data, names: &Judged, untold: Untold) -> Option<J
     });
     let least = idle.min_by(|a, b| a.0.total_cmp(&b.0));
     least.map(|(_, fewer)| fewer)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::innovations::toy::{self, Noise, stop};
+
+    /// A trial of a name that is clear: as many nats at both levels of the noise, unseen runs with this t.
+    fn of_name(data: &Data, base: &Judged, id: Id, nats: f64, t: f64) -> Trial {
+        let entries = data.catalogue.entries();
+        let entry = entries.iter().position(|m| m.id() == id).unwrap();
+        Trial {
+            claim: Claim::Mechanism(id, entry),
+            gain: nats,
+            price: 0.0,
+            unseen: (nats, t),
+            at_sensors: (nats, t),
+            first: false,
+            own: true,
+            says_as_well: None,
+            fed_by_chain: false,
+            remembers: false,
+            outlasts_chain: true,
+            beside_chain: true,
+            readings: 1,
+            size: f64::INFINITY,
+            predicts: 0.2,
+            unanimous: [false, false],
+            judged: base.clone().without_columns(),
+        }
+    }
+
+    #[test]
+    fn a_name_that_stood_before_another_was_taken_up_stands_while_as_much_speaks_for_it() {
+        let data = stop(Noise::TYPICAL, 4);
+        let base = toy::settled(&data);
+        let load = |nats, t| of_name(&data, &base, Id::LoadSensitivity, nats, t);
+        let stood = load(100.0, 3.0);
+        let mut before = TakenUp::default();
+        before.add(&of_name(&data, &base, Id::EncoderRipple, 600.0, 3.0));
+        before.stood = vec![(Id::LoadSensitivity, stood.weight())];
+        let is_taken = |trial: Trial, before: &TakenUp| next(&data, &[trial], before).is_some();
+        // Less even than before it would not stand by itself.
+        assert!(is_taken(load(100.0, 3.0), &TakenUp::default()));
+        assert!(!is_taken(load(90.0, 1.3), &TakenUp::default()));
+        assert!(is_taken(load(90.0, 1.3), &before));
+        // Nor where what was taken up says most of it, or where it is not even likely.
+        assert!(!is_taken(load(40.0, 1.3), &before));
+        assert!(!is_taken(load(90.0, 0.5), &before));
+        // Nothing is said of other names.
+        let other = of_name(&data, &base, Id::WearDrift, 90.0, 1.3);
+        assert!(!is_taken(other, &before));
+    }
 }
