@@ -114,7 +114,7 @@ impl StructuralResonance {
     fn most_damping(&self) -> f64 {
         match self.form {
             Form::Whole => 0.3,
-            Form::Share => 0.1,
+            Form::Share => 0.25,
         }
     }
 }
@@ -149,7 +149,7 @@ mod tests {
         let context = Context::default();
         let [whole, share] = [Form::Whole, Form::Share].map(|form| StructuralResonance { form });
         let rings = |p: &[f64]| share.owns(p, &context);
-        assert!(rings(&[20.0, 0.05, 0.4]) && !rings(&[20.0, 0.1, 0.4]));
+        assert!(rings(&[20.0, 0.11, 0.4]) && !rings(&[20.0, 0.25, 0.4]));
         assert!(whole.owns(&[20.0, 0.3], &context));
     }
 }
