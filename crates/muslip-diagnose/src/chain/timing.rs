@@ -104,7 +104,14 @@ impl Timing {
         } else {
             LEAST_BRAKE_EARLY_S
         };
-        self.brake.std < VAGUE_S && self.brake.value < -least
+        let Late { value, std } = self.brake;
+        // One that is much earlier need not be known as well.
+        let known = if std < VAGUE_S {
+            0.0
+        } else {
+            UNKNOWN_STDS * std
+        };
+        value + known < -least
     }
 
     /// Leaves the brake's reading as early as it is.
@@ -505,6 +512,19 @@ mod tests {
         let mut no_brake = timing(-0.010, 0.030, 0.0);
         no_brake.brake.std = 0.02;
         assert_eq!(no_brake.drag_late(), None);
+    }
+
+    #[test]
+    fn a_brake_is_early_by_more_than_its_filters_make_it_where_that_is_known() {
+        let early = |brake, std| {
+            let mut told = timing(0.010, 0.030, brake);
+            told.brake.std = std;
+            told.brake_early()
+        };
+        assert!(early(-0.021, 1e-3) && !early(-0.019, 1e-3));
+        // Three standard deviations beyond those 20 ms.
+        assert!(early(-0.055, 5e-3) && !early(-0.034, 5e-3));
+        assert!(!early(-0.055, f64::INFINITY));
     }
 
     #[test]
