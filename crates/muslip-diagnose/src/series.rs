@@ -116,6 +116,15 @@ impl Series {
             Balance::Vehicle => &self.vehicle_balance,
         }
     }
+    /// Stretches of the wheel's balance; of the vehicle's where that cannot be formed.
+    #[must_use]
+    pub fn level_segments(&self) -> &[Range<usize>] {
+        if self.wheel_balance.is_empty() {
+            &self.vehicle_balance
+        } else {
+            &self.wheel_balance
+        }
+    }
     /// Slip from the smoothed speeds and the rig's radius; zero where it is not defined.
     #[must_use]
     pub fn slip(&self, k: usize, radius: f64) -> f64 {

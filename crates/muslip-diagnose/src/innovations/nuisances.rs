@@ -174,12 +174,7 @@ impl<'a> Chain<'a> {
     /// A force or torque smoothed over this reach, within the stretches where its balance is formed.
     fn smoothed(&self, x: &[f64], reach: f64) -> Vec<f64> {
         let s = self.series;
-        let segments = if s.wheel_balance.is_empty() {
-            &s.vehicle_balance
-        } else {
-            &s.wheel_balance
-        };
-        mean_twice_about(&s.time, x, segments, reach)
+        mean_twice_about(&s.time, x, s.level_segments(), reach)
     }
 
     /// What smoothing over this reach takes off a force or torque, integrated.

@@ -93,12 +93,7 @@ fn calibrated_force(series: &Series, law: &[f64]) -> Vec<f64> {
     let by_law = quiet_force(series, law);
     let read = series.drag_smooth.iter().zip(&by_law);
     let off: Vec<f64> = read.map(|(read, law)| read - law).collect();
-    let segments = if series.wheel_balance.is_empty() {
-        &series.vehicle_balance
-    } else {
-        &series.wheel_balance
-    };
-    let mut force = mean_twice_about(&series.time, &off, segments, OFF_REACH_S);
+    let mut force = mean_twice_about(&series.time, &off, series.level_segments(), OFF_REACH_S);
     for (force, law) in force.iter_mut().zip(by_law) {
         *force += law;
     }
