@@ -394,10 +394,8 @@ mod tests {
 
     /// A trial of a name that is clear: as many nats at both levels of the noise, unseen runs with this t.
     fn of_name(data: &Data, base: &Judged, id: Id, nats: f64, t: f64) -> Trial {
-        let entries = data.catalogue.entries();
-        let entry = entries.iter().position(|m| m.id() == id).unwrap();
         Trial {
-            claim: Claim::Mechanism(id, entry),
+            claim: Claim::Mechanism(id, toy::entry_of(data, id)),
             gain: nats,
             price: 0.0,
             unseen: (nats, t),

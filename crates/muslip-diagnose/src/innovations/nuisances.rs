@@ -297,21 +297,14 @@ pub fn nuisances(data: &Data, slopes: &Slopes, run: usize) -> Vec<(f64, Triple)>
 mod tests {
     use super::*;
     use crate::innovations::hypothesis::{Beside, judge_added};
-    use crate::innovations::toy::{EFFORT, Lags, Noise, settled, stop_with};
+    use crate::innovations::toy::{EFFORT, Lags, Noise, settled, stop_with, with_term};
     use crate::mechanism::Id;
-    use crate::model::Term;
 
     /// What a lag of the brake gains in nats, no price taken off, and its time constant in s.
     fn brake_lag_in(lags: Lags) -> (f64, f64) {
         let data = stop_with(Noise::TYPICAL, lags, 7);
         let base = settled(&data);
-        let entries = data.catalogue.entries();
-        let entry = entries.iter().position(|m| m.id() == Id::BrakeLag).unwrap();
-        let mut model = base.model.clone();
-        model.terms.push(Term {
-            entry,
-            parameters: vec![0.01],
-        });
+        let model = with_term(&data, &base, Id::BrakeLag, 0.01);
         let beside = Beside::new(&data, &base);
         let with = judge_added(&data, &model, &[], &beside, EFFORT).unwrap();
         (base.loss - with.loss, with.model.terms[0].parameters[0])

@@ -285,9 +285,8 @@ fn integrated<T: Number>(
 mod tests {
     use super::*;
     use crate::innovations::hypothesis::{Guess, judge};
-    use crate::innovations::toy::{EFFORT, Noise, settled, stop};
+    use crate::innovations::toy::{EFFORT, Noise, settled, stop, with_term};
     use crate::mechanism::Id;
-    use crate::model::Term;
 
     /// Root mean square over the stretches of the wheel's balance.
     fn rms(series: &Series, x: impl Fn(usize) -> f64) -> f64 {
@@ -342,13 +341,7 @@ mod tests {
                 *force *= 1.2;
             }
         }
-        let entries = data.catalogue.entries();
-        let entry = entries.iter().position(|m| m.id() == Id::ForceGain);
-        let mut model = settled(&data).model;
-        model.terms.push(Term {
-            entry: entry.unwrap(),
-            parameters: vec![0.0],
-        });
+        let model = with_term(&data, &settled(&data), Id::ForceGain, 0.0);
         let judged = judge(&data, &model, &[], Guess::None, EFFORT).unwrap();
         let gain = 1.0 + judged.model.terms[0].parameters[0];
         assert!((gain - 1.2).abs() < 0.02, "{gain}");

@@ -8,7 +8,8 @@ use super::blocks::blocks;
 use super::hypothesis::{Effort, Guess, Judged, judge};
 use crate::campaign::{Rig, Run};
 use crate::data::Data;
-use crate::model::Model;
+use crate::mechanism::Id;
+use crate::model::{Model, Term};
 
 pub const PEAK: f64 = 0.8;
 pub const CRITICAL: f64 = 0.12;
@@ -137,4 +138,20 @@ pub fn settled(data: &Data) -> Judged {
         base = judge(data, &base.model, &[], guess, EFFORT).unwrap();
     }
     base
+}
+
+/// Entry of the first form of a mechanism.
+pub fn entry_of(data: &Data, id: Id) -> usize {
+    let entries = data.catalogue.entries();
+    entries.iter().position(|m| m.id() == id).unwrap()
+}
+
+/// A judged model with one term more.
+pub fn with_term(data: &Data, judged: &Judged, id: Id, parameter: f64) -> Model {
+    let mut model = judged.model.clone();
+    model.terms.push(Term {
+        entry: entry_of(data, id),
+        parameters: vec![parameter],
+    });
+    model
 }

@@ -111,7 +111,7 @@ pub fn judge_added(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::innovations::toy::{EFFORT, Noise, settled, stop};
+    use crate::innovations::toy::{EFFORT, Noise, settled, stop, with_term};
     use crate::mechanism::Id;
     use crate::model::Term;
 
@@ -159,15 +159,8 @@ mod tests {
         };
         let mut data = stop(noise, 4);
         data.context.inertia = 1.0;
-        let entries = data.catalogue.entries();
-        let entry = entries.iter().position(|m| m.id() == Id::WheelInertia);
-        let entry = entry.unwrap();
         let judged = |data: &Data| {
-            let mut model = settled(data).model;
-            model.terms.push(Term {
-                entry,
-                parameters: vec![0.1],
-            });
+            let model = with_term(data, &settled(data), Id::WheelInertia, 0.1);
             judge(data, &model, &[], Guess::None, EFFORT).unwrap()
         };
         let slow = judged(&data);
