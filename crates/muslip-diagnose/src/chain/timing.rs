@@ -206,9 +206,7 @@ pub fn averaging(runs: &[Run]) -> usize {
     let most = ((2.0 * SHORTEST_STEP_S) / (step * by_step as f64))
         .floor()
         .max(1.0) as usize;
-    // Very long campaigns are averaged as far as memory asks for.
-    let huge = samples.div_ceil(20 * ENOUGH_SAMPLES).max(1);
-    by_step * by_size.min(most).max(huge)
+    by_step * by_size.min(most)
 }
 
 /// A campaign as it was recorded: what was held is drawn as lines, neighbours are averaged.

@@ -30,7 +30,7 @@ const DECIDED: f64 = 0.9;
 
 /// Samples above which neighbours are averaged first: memory and time would grow without telling more of anything
 /// but the fastest effects.
-const MOST_SAMPLES: usize = 300_000;
+const MOST_SAMPLES: usize = 100_000;
 
 /// Diagnoses a campaign of recordings: the measuring chain first, then physics on innovations. Deterministic: the
 /// same input gives the same result, whatever the number of threads. The recordings are given up, so that long ones
