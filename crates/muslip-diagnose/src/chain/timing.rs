@@ -36,6 +36,8 @@ pub struct Timing {
     brake_heard: bool,
     /// How late the drag is left, in s.
     drag: f64,
+    /// Whether the brake's reading is left as early as it is.
+    leaves_brake: bool,
 }
 
 impl Timing {
@@ -116,8 +118,24 @@ impl Timing {
 
     /// Leaves the brake's reading as early as it is.
     fn leave_brake(&mut self) {
+        self.leaves_brake = true;
         self.late.brake = 0.0;
         self.brake.value = 0.0;
+    }
+
+    /// Leaves the drag as late, and the brake as early, as they are to be explained, or as another's timing did; by how
+    /// much the drag, and whether the brake.
+    fn leave_to_physics(&mut self, other: Option<&Self>) -> (Option<f64>, bool) {
+        let drag = other.map_or_else(
+            || self.drag_late(),
+            |other| (other.drag > 0.0).then_some(other.drag),
+        );
+        self.leave(drag.unwrap_or(0.0));
+        let brake = other.map_or_else(|| self.brake_early(), |other| other.leaves_brake);
+        if brake {
+            self.leave_brake();
+        }
+        (drag, brake)
     }
 
     /// What the timing does not tell of the chain.
@@ -239,21 +257,18 @@ impl Recorded<'_> {
 
     /// What is left to physics once the timing is found: a drag later than all others, or a brake's reading before its
     /// torque, is to be told apart (delay, lag or what else keeps it back), so the channels are put back by that much.
+    /// An argument that starts from another's timing leaves what that did: it is to speak of the same question.
     fn left_to_physics(
         &self,
         mut data: Data,
         mut judged: Judged,
         mut timing: Timing,
+        start: Option<&Timing>,
         effort: Effort,
     ) -> Option<(Data, Timing, Judged)> {
         timing.found = timing.late;
         timing.brake_heard = self.audit.brake_late.std.is_finite();
-        let drag = timing.drag_late();
-        timing.leave(drag.unwrap_or(0.0));
-        let brake = timing.brake_early();
-        if brake {
-            timing.leave_brake();
-        }
+        let (drag, brake) = timing.leave_to_physics(start);
         if drag.is_some() || brake {
             data = self.at_one_time(timing.late);
             // What is to be explained is not to be explained away: a drag that two others say is late, or a brake.
@@ -403,7 +418,7 @@ pub fn timed(
         model = judged.model.clone();
         let small = shift.iter().all(|s| s.abs() < SMALL_SHIFT_S);
         if last || (small && pass >= 2) {
-            return recorded.left_to_physics(data, judged, timing, effort);
+            return recorded.left_to_physics(data, judged, timing, start, effort);
         }
         guess = Some(judged.parts);
         timing.moved(audit, shift);
@@ -609,6 +624,23 @@ mod tests {
         let mut drag = found(-0.012, -0.012);
         drag.leave(0.012);
         assert!((drag.untold().brake_s - 9e-4).abs() < 1e-9);
+    }
+
+    #[test]
+    fn an_argument_by_fewer_runs_leaves_what_the_one_by_all_runs_does() {
+        let mut all = timing(-0.010, -0.011, -0.010);
+        assert_eq!(all.leave_to_physics(None), (Some(0.010), false));
+        // By itself it would give this to the chain.
+        let mut fewer = timing(-0.010, -0.018, -0.019);
+        assert_eq!(fewer.clone().leave_to_physics(None), (None, false));
+        assert_eq!(fewer.leave_to_physics(Some(&all)), (Some(0.010), false));
+        assert!((fewer.wheel.value).abs() < 1e-12 && (fewer.vehicle.value + 0.008).abs() < 1e-12);
+        // And this to the brake.
+        let mut alone = timing(0.0, 0.0, -0.030);
+        let mut late = timing(0.010, 0.011, 0.010);
+        assert_eq!(late.leave_to_physics(None), (None, false));
+        assert_eq!(alone.leave_to_physics(Some(&late)), (None, false));
+        assert_eq!(alone.leave_to_physics(None), (None, true));
     }
 
     #[test]
