@@ -14,6 +14,7 @@ use crate::innovations::dependence::Dependence;
 use crate::innovations::hypothesis::{Beside, Judged, Unseen};
 use crate::law::{closest, squares};
 use crate::mechanism::{Balance, Id, Kind, Memory};
+use crate::model::Term;
 use crate::number::mean_and_std;
 
 /// What a trial adds to a model.
@@ -208,10 +209,22 @@ impl<'a> Before<'a> {
         let counts = judged.grams.iter().flatten().map(|g| g.count);
         let readings = counts.sum::<usize>() / judged.parts.len().max(1);
         let balance = claim.balance(data);
+        let fed_by_chain = claim
+            .mechanism()
+            .is_some_and(|(_, entry)| data.catalogue.get(entry).fed_by_chain());
+        // What a memory leaves looks like what a chain leaves, not like what it does not.
+        let leaves_alike = |term: &Term| {
+            let mechanism = data.catalogue.get(term.entry);
+            fed_by_chain
+                || mechanism
+                    .memory_s(&term.parameters, &data.context)
+                    .is_none()
+        };
         let named = base.model.terms.iter().any(|t| {
             let term = data.catalogue.get(t.entry);
             term.id().balance() == balance
                 && (balance != Balance::Tyre || term.facts().through_force)
+                && leaves_alike(t)
         });
         let in_force = claim.works_through_force(data);
         let predicts = if in_force {
@@ -260,8 +273,7 @@ impl<'a> Before<'a> {
             own,
             says_as_well: term
                 .and_then(|(_, entry, p)| data.catalogue.get(entry).says_as_well(p, &data.context)),
-            fed_by_chain: term
-                .is_some_and(|(_, entry, _)| data.catalogue.get(entry).fed_by_chain()),
+            fed_by_chain,
             remembers: memory_s.is_some(),
             outlasts_chain: memory_s
                 .is_none_or(|(memory, least)| memory > least.max(chain_s) && memory < longest_s),
