@@ -118,6 +118,18 @@ impl Trial {
         (self.gain.max(least) * self.at_sensors.0.max(0.0)).sqrt()
     }
 
+    /// What all unseen runs gain by it in nats: at the noise as fitted, or at the sensors' where the runs' own differences
+    /// hide it.
+    #[must_use]
+    pub fn gain_on_unseen_runs(&self, runs: usize) -> f64 {
+        let fitted = self.unseen.0 * runs as f64;
+        if fitted > 0.0 {
+            fitted
+        } else {
+            self.at_sensors.0
+        }
+    }
+
     /// How alike the runs speak for it: the larger t of the two levels, one of signed roots being about twice the plain
     /// one.
     #[must_use]

@@ -60,7 +60,8 @@ impl Answer<'_> {
                     evidence: Evidence {
                         delta_bic: 2.0 * trial.weight(),
                         holdout_nll_gain_per_sample: finite_or_zero(
-                            trial.unseen.0 * self.data.series.len() as f64 / samples.max(1) as f64,
+                            trial.gain_on_unseen_runs(self.data.series.len())
+                                / samples.max(1) as f64,
                         ),
                         confidence: sure.confidence,
                     },
