@@ -108,14 +108,7 @@ pub fn catalogue<T: Number>() -> Vec<Box<dyn Mechanism<T>>> {
     );
     all.extend(wear_drift::FORMS.map(|form| entry(wear_drift::WearDrift { form })));
     all.extend(zero_drift::FORMS.map(|form| entry(zero_drift::ZeroDrift { form })));
-    for form in once_a_turn::FORMS {
-        let of = run_out::Of::Drag;
-        all.push(entry(run_out::RunOut { form, of }));
-        if form.orders == 1 {
-            let of = run_out::Of::Radius;
-            all.push(entry(run_out::RunOut { form, of }));
-        }
-    }
+    all.extend(run_out::Of::all().map(entry));
     all.extend(once_a_turn::FORMS.map(|form| entry(encoder_ripple::EncoderRipple { form })));
     all.extend(bearing_drag::FORMS.map(|form| entry(bearing_drag::BearingDrag { form })));
     all.push(entry(vehicle_speed_delay::VehicleSpeedDelay));

@@ -1,10 +1,12 @@
 //! Drag varies once (or a few times) a wheel revolution.
 
-use super::once_a_turn::{Form, radius_reads_as_ripple};
+use super::once_a_turn::{FORMS, Form, radius_reads_as_ripple};
 use super::prelude::*;
 
-/// Largest amplitude of an order, as a share of the drag.
+/// Largest amplitude of an order, as a share of the drag or of the load.
 const LIMIT: f64 = 0.5;
+/// Share of the largest drag from which the drag is that of a braked wheel.
+const BRAKED: f64 = 0.3;
 /// The same as a share of the radius.
 const LIMIT_OF_RADIUS: f64 = 0.08;
 
@@ -13,8 +15,45 @@ const LIMIT_OF_RADIUS: f64 = 0.08;
 pub enum Of {
     /// The drag, in proportion to itself: a load that varies, a tyre unequally stiff.
     Drag,
+    /// The drag, in proportion to the load, braked or not: a tyre out of round or unequally stiff along its tread.
+    Load,
     /// The rolling radius, hence the slip.
     Radius,
+}
+
+impl Of {
+    /// All of them, with each of these orders and phases that is told apart.
+    pub fn all() -> impl Iterator<Item = RunOut> {
+        [Self::Drag, Self::Load, Self::Radius]
+            .into_iter()
+            .flat_map(|of| FORMS.map(|form| RunOut { form, of }))
+            .filter(|own| own.of == Self::Drag || own.form.orders == 1)
+    }
+
+    fn word(self, form: Form) -> &'static str {
+        match (self, form.phase_per_run) {
+            (Self::Drag, _) => form.as_str(),
+            (Self::Load, false) => "load",
+            (Self::Load, true) => "load_phase_per_run",
+            (Self::Radius, false) => "radius",
+            (Self::Radius, true) => "radius_phase_per_run",
+        }
+    }
+}
+
+/// Mean of the load over the drag of a braked wheel.
+fn load_over_drag(series: &[Series], context: &Context) -> f64 {
+    let least = BRAKED * context.max_drag;
+    let (mut sum, mut count) = (0.0, 0.0);
+    for s in series {
+        for (load, drag) in s.load.smooth.iter().zip(&s.drag_smooth) {
+            if *drag > least && load.is_finite() {
+                sum += load / drag;
+                count += 1.0;
+            }
+        }
+    }
+    sum / f64::max(count, 1.0)
 }
 
 /// Drag varies once (or a few times) a wheel revolution.
@@ -27,24 +66,22 @@ pub struct RunOut {
 
 impl Describe for RunOut {
     fn facts(&self) -> Facts {
-        let (form, stage, equation) = match self.of {
+        let (stage, equation) = match self.of {
             Of::Drag => (
-                self.form.as_str(),
                 Stage::Contact,
                 "drag = normal_force mu(slip) (1 + sum a_k cos(k angle) + b_k sin(k angle))",
             ),
+            Of::Load => (
+                Stage::Contact,
+                "drag = normal_force (mu(slip) + a cos(angle) + b sin(angle))",
+            ),
             Of::Radius => (
-                if self.form.phase_per_run {
-                    "radius_phase_per_run"
-                } else {
-                    "radius"
-                },
                 Stage::Kinematics,
                 "slip = 1 - radius (1 + a cos(angle) + b sin(angle)) omega / v",
             ),
         };
         Facts {
-            form,
+            form: self.of.word(self.form),
             rare: self.of == Of::Radius,
             fed_by_chain: true,
             ..Facts::of(Id::RunOut, stage, equation)
@@ -52,7 +89,7 @@ impl Describe for RunOut {
     }
     fn parameters(&self, context: &Context) -> Vec<Parameter> {
         let limit = match self.of {
-            Of::Drag => LIMIT,
+            Of::Drag | Of::Load => LIMIT,
             Of::Radius => LIMIT_OF_RADIUS,
         };
         self.form.parameters(context, limit)
@@ -68,6 +105,9 @@ impl Describe for RunOut {
         let percent = 100.0 * reported[0].value;
         match self.of {
             Of::Drag => format!("drag varies once a wheel revolution by {percent:.2} % of itself"),
+            Of::Load => format!(
+                "drag varies once a wheel revolution in proportion to the load, braked or not; of a braked wheel's by {percent:.2} %"
+            ),
             Of::Radius => format!(
                 "the rolling radius varies once a wheel revolution; the drag at half the critical slip by {percent:.2} % of itself"
             ),
@@ -75,7 +115,7 @@ impl Describe for RunOut {
     }
     fn guide(&self) -> Guide {
         Guide {
-            physics: "A wheel or a drum that is out of round presses harder and less hard once a revolution, and a tyre is not equally stiff or equally large all around. The drag varies with the wheel's angle: in proportion to itself, or as the slip that a varying radius makes.",
+            physics: "A wheel or a drum that is out of round presses harder and less hard once a revolution, and a tyre is not equally stiff or equally large all around. The drag varies with the wheel's angle: in proportion to itself or to the load, or as the slip that a varying radius makes.",
             kind: Kind::Wheel,
             touches: &[Balance::Tyre],
             memory: Memory::None,
@@ -103,6 +143,11 @@ impl<T: Number> Mechanism<T> for RunOut {
                         *force = *force * (r + 1.0);
                     }
                 }
+                Of::Load => {
+                    for ((force, load), r) in state.force.iter_mut().zip(&state.load).zip(ripple) {
+                        *force += *load * r;
+                    }
+                }
                 Of::Radius => {
                     let n = ripple.len();
                     let radius = state
@@ -118,9 +163,46 @@ impl<T: Number> Mechanism<T> for RunOut {
     fn report(&self, p: &[T], fitted: &Fitted<'_, T>) -> Vec<Reported<T>> {
         let factor = match self.of {
             Of::Drag => 1.0,
+            Of::Load => load_over_drag(fitted.series, fitted.context),
             // On the base curve d ln mu / d slip is 1.2 / critical slip at half of that.
             Of::Radius => 1.2 / fitted.law.critical.value(),
         };
         self.form.report(p, factor)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::series::Channel;
+
+    #[test]
+    fn a_share_of_the_load_is_told_as_one_of_a_braked_wheel_s_drag() {
+        let channel = |smooth: Vec<f64>| Channel {
+            smooth,
+            ..Channel::default()
+        };
+        // Rolls freely, then brakes with 0.5 and 0.25 of the load.
+        let series = Series {
+            load: channel(vec![1000.0; 3]),
+            drag_smooth: vec![10.0, 500.0, 250.0],
+            ..Series::default()
+        };
+        let context = Context {
+            max_drag: 500.0,
+            ..Context::default()
+        };
+        let factor = load_over_drag(core::slice::from_ref(&series), &context);
+        assert!((factor - 3.0).abs() < 1e-12, "{factor}");
+        assert_eq!(load_over_drag(&[], &context), 0.0);
+    }
+
+    #[test]
+    fn every_form_has_a_word_of_its_own() {
+        let mut words: Vec<&str> = Of::all().map(|own| own.of.word(own.form)).collect();
+        let all = words.len();
+        words.sort_unstable();
+        words.dedup();
+        assert_eq!((words.len(), all), (7, 7));
     }
 }
