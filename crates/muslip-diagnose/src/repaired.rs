@@ -502,19 +502,12 @@ impl Correction {
         let action = Action::parse(&self.acts_on)
             .ok_or_else(|| RepairedError::BadValue(format!("acts_on = \"{}\"", self.acts_on)))?;
         let n = data.series[run].len();
-        let series = &data.series[run];
-        let values = if self.variable == "wheel_angle_rad" {
-            series.angle.clone()
-        } else {
-            match Variable::all(data)
-                .iter()
-                .find(|v| v.key(data) == self.variable)
-            {
-                Some(variable) => variable.values(data, run),
-                // A column that this recording does not have: no correction.
-                None => return Ok(vec![0.0; n]),
-            }
+        let mut variables = Variable::all(data).into_iter();
+        let Some(variable) = variables.find(|v| v.key(data) == self.variable) else {
+            // A column that this recording does not have: no correction.
+            return Ok(vec![0.0; n]);
         };
+        let values = variable.values(data, run);
         Ok((0..n)
             .map(|k| {
                 let mut amount = match hat(&self.knots, values[k]) {

@@ -20,6 +20,8 @@ pub enum Variable {
     SinceOnset,
     /// Distance run.
     Distance,
+    /// Angle that the wheel has turned by since the start of the run.
+    WheelAngle,
     /// Rate of change of slip.
     SlipRate,
     /// Rate of change of the normal force.
@@ -41,6 +43,7 @@ impl Variable {
             Self::NormalForce | Self::NormalForceRate => "normal_force_n".into(),
             Self::Time | Self::SinceOnset => "time_s".into(),
             Self::Distance => "distance_m".into(),
+            Self::WheelAngle => "wheel_angle_rad".into(),
             Self::SlipRate => "slip_rate".into(),
             Self::Column(i) => data.extra_names.get(*i).cloned().unwrap_or_default(),
         }
@@ -69,6 +72,7 @@ impl Variable {
             Self::Time,
             Self::SinceOnset,
             Self::Distance,
+            Self::WheelAngle,
             Self::SlipRate,
             Self::NormalForceRate,
             Self::VehicleSpeedRate,
@@ -114,6 +118,7 @@ impl Variable {
                     .collect()
             }
             Self::Distance => s.distance.clone(),
+            Self::WheelAngle => s.angle.clone(),
             Self::SlipRate => (0..s.len())
                 .map(|k| {
                     if !s.rolling[k] {

@@ -134,8 +134,8 @@ fn left_by_form(trial: &Trial, before: &TakenUp) -> bool {
     })
 }
 
-/// The trial that is taken up: a mechanism, unless a free dependence accounts for much more in the same balance. One
-/// in another balance is no other account of it, and has its turn later.
+/// The trial that is taken up: a mechanism, unless a free dependence accounts for much more in a balance that it touches.
+/// One in another balance is no other account of it, and has its turn later.
 fn next<'a>(data: &Data, trials: &'a [Trial], before: &TakenUp) -> Option<&'a Trial> {
     let own = |t: &&Trial| (stands(t) || before.still_stands(t)) && !left_by_form(t, before);
     let standing = || trials.iter().filter(own);
@@ -153,8 +153,12 @@ fn next<'a>(data: &Data, trials: &'a [Trial], before: &TakenUp) -> Option<&'a Tr
     });
     // Much more at the sensors' noise, too: what the runs' own differences hide of a name says nothing against it.
     let much_more = |own: f64, than: f64| own > DEPENDENCE_SHARE * than + DEPENDENCE_NATS;
+    let touched = named.mechanism().map_or(&[][..], |(_, entry)| {
+        data.catalogue.get(entry).guide().touches
+    });
     let instead = |t: &&Trial| {
-        let of_same = t.claim.balance(data) == named.claim.balance(data);
+        let balance = t.claim.balance(data);
+        let of_same = balance == named.claim.balance(data) || touched.contains(&balance);
         of_same
             && much_more(t.weight(), named.weight())
             && much_more(t.at_sensors.0, named.at_sensors.0)

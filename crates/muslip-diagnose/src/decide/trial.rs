@@ -47,7 +47,7 @@ impl Claim {
     fn is_per_run(&self, data: &Data) -> bool {
         match self {
             Self::Mechanism(_, entry) => data.catalogue.get(*entry).form().contains("per_run"),
-            Self::Dependence(_) => false,
+            Self::Dependence(own) => own.is_per_run(),
         }
     }
 

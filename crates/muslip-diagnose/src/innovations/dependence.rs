@@ -11,6 +11,7 @@ use crate::data::Data;
 use crate::mechanism::Balance;
 use crate::number::finite_or_zero;
 use crate::repaired::Correction;
+use crate::series::Series;
 use crate::variable::Variable;
 
 /// Hat functions of a dependence.
@@ -19,6 +20,8 @@ const KNOTS: usize = 7;
 const LEAST_KNOTS: usize = 3;
 /// Fewest values that knots are set among.
 const LEAST_SAMPLES: usize = 30;
+/// Largest advance of the wheel's angle from one sample to the next that shows what varies with it, in rad.
+const MOST_ADVANCE: f64 = 2.0;
 
 /// A dependence of one balance on one variable, as columns.
 #[derive(Clone)]
@@ -29,12 +32,24 @@ pub struct Dependence {
     pub variable: Variable,
     /// How it acts (in the tyre balance).
     pub action: Action,
-    /// Knots of the hat functions.
-    pub knots: Vec<f64>,
-    /// The knot at which a dependence of friction is one: the law's own peak friction holds there. The fullest one.
-    reference: Option<usize>,
+    shape: Shape,
     /// The variable by run and sample.
     values: Arc<Vec<Vec<f64>>>,
+}
+
+/// What stands for the function of the variable.
+#[derive(Clone)]
+enum Shape {
+    /// Hat functions.
+    Hats {
+        /// Their knots.
+        knots: Vec<f64>,
+        /// The knot at which a dependence of friction is one: the law's own peak friction holds there. The fullest one.
+        reference: Option<usize>,
+    },
+    /// A wave once a turn of the wheel, for each run from an angle of its own: where the wheel stood at the start is not
+    /// known. Of the brake's torque, for it is a disc or a drum that turns.
+    Wave,
 }
 
 /// Columns of these dependences together.
@@ -100,6 +115,10 @@ fn on(data: &Data, variable: &Variable) -> Vec<Dependence> {
         if !data.forms(balance) || holds_own_noise(variable, balance) {
             continue;
         }
+        if *variable == Variable::WheelAngle {
+            out.extend(wave(data, balance, &values));
+            continue;
+        }
         // What was recorded beside the rig's channels may well act in proportion, and differ by run alone.
         let recorded = matches!(variable, Variable::Column(_));
         let counts: &[usize] = if recorded { &[KNOTS, 2] } else { &[KNOTS] };
@@ -123,13 +142,29 @@ fn on(data: &Data, variable: &Variable) -> Vec<Dependence> {
                 balance,
                 variable: variable.clone(),
                 action,
-                knots: knots.clone(),
-                reference,
+                shape: Shape::Hats {
+                    knots: knots.clone(),
+                    reference,
+                },
                 values: Arc::clone(&values),
             });
         }
     }
     out
+}
+
+/// What varies with the wheel's angle in a balance: of the brake, where samples and runs show it. The tyre's and the
+/// wheel speed's have names.
+fn wave(data: &Data, balance: Balance, angles: &Arc<Vec<Vec<f64>>>) -> Option<Dependence> {
+    let resolved = data.context.dt * data.context.mean_wheel_speed < MOST_ADVANCE;
+    let shown = balance == Balance::Wheel && resolved && data.series.len() > 1;
+    shown.then(|| Dependence {
+        balance,
+        variable: Variable::WheelAngle,
+        action: Action::Force,
+        shape: Shape::Wave,
+        values: Arc::clone(angles),
+    })
 }
 
 /// Whether a variable holds the noise of a balance's own level: a rate of the level's speed, integrated again, is
@@ -142,67 +177,174 @@ fn holds_own_noise(variable: &Variable, balance: Balance) -> bool {
     }
 }
 
+/// What a rate has come to by each sample, in their order; as the rows integrate; what is no number, or a gap, adds little.
+fn integral<'a>(
+    series: &'a Series,
+    rate: impl Fn(usize) -> f64 + 'a,
+) -> impl FnMut(usize) -> f64 + 'a {
+    let (mut sum, mut before) = (0.0, 0.0);
+    move |k| {
+        let now = finite_or_zero(rate(k));
+        if k > 0 {
+            sum += 0.5 * (now + before) * series.dt[k].min(0.1);
+        }
+        before = now;
+        sum
+    }
+}
+
 impl Dependence {
     /// Its columns.
     #[must_use]
     pub fn width(&self) -> usize {
-        self.knots.len() - usize::from(self.reference.is_some())
+        match &self.shape {
+            Shape::Hats { knots, reference } => knots.len() - usize::from(reference.is_some()),
+            Shape::Wave => 2 * self.values.len(),
+        }
     }
 
-    /// Columns on one run beside the model that the levers are of: minus the lever times each hat in the tyre's row,
-    /// integrated in the others.
+    /// Whether what it is belongs to each run alone.
+    #[must_use]
+    pub fn is_per_run(&self) -> bool {
+        matches!(self.shape, Shape::Wave)
+    }
+
+    /// Columns on one run beside the model that the levers are of: minus the lever times each function in the tyre's
+    /// row, integrated in the others.
     #[must_use]
     pub fn columns(&self, data: &Data, levers: &Levers, run: usize) -> Vec<Triple> {
+        match &self.shape {
+            Shape::Hats { knots, reference } => self.of_hats(data, levers, run, knots, *reference),
+            Shape::Wave => self.of_wave(data, run),
+        }
+    }
+
+    fn of_hats(
+        &self,
+        data: &Data,
+        levers: &Levers,
+        run: usize,
+        knots: &[f64],
+        reference: Option<usize>,
+    ) -> Vec<Triple> {
         let (s, u) = (&data.series[run], &self.values[run]);
-        let hats: Vec<Option<(usize, f64)>> = u.iter().map(|u| hat(&self.knots, *u)).collect();
+        let hats: Vec<Option<(usize, f64)>> = u.iter().map(|u| hat(knots, *u)).collect();
         let height = |c: usize, k: usize| match hats[k] {
             Some((at, w)) if at == c => 1.0 - w,
             Some((at, w)) if at + 1 == c => w,
             _ => 0.0,
         };
-        let formed = !s.segments(self.balance).is_empty();
-        let samples = if formed { s.len() } else { 0 };
-        (0..self.knots.len())
-            .filter(|c| self.reference != Some(*c))
-            .map(|c| {
-                let mut sum = 0.0;
-                let entry = |k: usize| match self.balance {
-                    Balance::Tyre => {
-                        finite_or_zero(-height(c, k) * levers.of(data, self.action, run, k))
-                    }
-                    Balance::Wheel | Balance::Vehicle => {
-                        let lever = if self.balance == Balance::Wheel {
-                            data.context.radius
-                        } else {
-                            1.0
-                        };
-                        sum += finite_or_zero(
-                            height(c, k) * lever * data.context.mean_load * s.dt[k].min(0.1),
-                        );
-                        sum
-                    }
-                };
-                let mut triple = Triple::default();
-                triple[self.balance as usize] = (0..samples).map(entry).collect();
-                triple
+        let of_wheel = self.balance == Balance::Wheel;
+        let arm = if of_wheel { data.context.radius } else { 1.0 };
+        let acting = arm * data.context.mean_load;
+        (0..knots.len())
+            .filter(|c| reference != Some(*c))
+            .map(|c| match self.balance {
+                Balance::Tyre => {
+                    let added = |k: usize| -height(c, k) * levers.of(data, self.action, run, k);
+                    self.triple(s, |k| finite_or_zero(added(k)))
+                }
+                Balance::Wheel | Balance::Vehicle => {
+                    self.triple(s, integral(s, |k| height(c, k) * acting))
+                }
             })
             .collect()
+    }
+
+    /// Cosine and sine of each run's own wave: nothing on the others.
+    fn of_wave(&self, data: &Data, run: usize) -> Vec<Triple> {
+        let (s, angle) = (&data.series[run], &self.values[run]);
+        let mut all = vec![Triple::default(); self.width()];
+        if let Some(torque) = &s.torque {
+            for (own, part) in all[2 * run..].iter_mut().zip([f64::cos, f64::sin]) {
+                *own = self.triple(s, integral(s, |k| part(angle[k]) * torque.smooth[k]));
+            }
+        }
+        all
+    }
+
+    /// A column of its balance, where that is formed.
+    fn triple(&self, series: &Series, at: impl FnMut(usize) -> f64) -> Triple {
+        let formed = !series.segments(self.balance).is_empty();
+        let samples = if formed { series.len() } else { 0 };
+        let mut triple = Triple::default();
+        triple[self.balance as usize] = (0..samples).map(at).collect();
+        triple
     }
 
     /// The correction of a repaired model, from the columns' coefficients.
     #[must_use]
     pub fn correction(&self, data: &Data, coefficients: &[f64]) -> Correction {
         let mut values = coefficients.to_vec();
-        if let Some(reference) = self.reference {
-            values.insert(reference, 0.0);
-        }
+        let knots = match &self.shape {
+            Shape::Hats { knots, reference } => {
+                if let Some(reference) = reference {
+                    values.insert(*reference, 0.0);
+                }
+                knots.clone()
+            }
+            // No balance but the brake's has one.
+            Shape::Wave => Vec::new(),
+        };
         Correction {
             variable: self.variable.key(data),
             acts_on: self.action.as_str().to_owned(),
             form: String::new(),
-            knots: self.knots.clone(),
+            knots,
             values,
             harmonics: Vec::new(),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::innovations::rows::rows_of;
+    use crate::innovations::toy::{CRITICAL, Noise, PEAK, stop};
+    use crate::model::Model;
+
+    #[test]
+    fn a_wave_s_columns_are_what_a_torque_that_varies_with_the_wheel_s_angle_changes() {
+        let exact = Noise {
+            wheel: 0.0,
+            drag: 0.0,
+            load: 0.0,
+            torque: 0.0,
+        };
+        let mut data = stop(exact, 4);
+        // A brake that is read without noise needs no smoothing.
+        for torque in &mut data.series[0].torque {
+            torque.smooth.clone_from(&torque.raw);
+        }
+        data.series.push(data.series[0].clone());
+        let model = Model::of_law(PEAK, CRITICAL);
+        let levers = Levers::new(&data, &model);
+        let waves = on(&data, &Variable::WheelAngle);
+        let [wave] = waves.as_slice() else {
+            panic!("of the wheel's balance alone: {}", waves.len());
+        };
+        assert_eq!((wave.balance, wave.width()), (Balance::Wheel, 4));
+        let columns = wave.columns(&data, &levers, 1);
+        assert!(columns[..2].iter().flatten().all(Vec::is_empty));
+        let before = rows_of(&data, &model, 1).wheel;
+        let (cos, sin) = (0.1, -0.05);
+        let series = &mut data.series[1];
+        let angle = series.angle.clone();
+        for (torque, angle) in series.torque.iter_mut().flat_map(|t| &mut t.raw).zip(angle) {
+            *torque *= 1.0 + cos * angle.cos() + sin * angle.sin();
+        }
+        let after = rows_of(&data, &model, 1).wheel;
+        let by = |k: usize| cos * columns[2][1][k] + sin * columns[3][1][k];
+        let largest = (0..before.len()).map(|k| by(k).abs()).fold(0.0, f64::max);
+        for k in 0..before.len() {
+            let off = after[k] - before[k] - by(k);
+            assert!(off.abs() < 1e-9 * largest, "{k}: {off} of {largest}");
+        }
+    }
+
+    #[test]
+    fn one_run_shows_no_wave_of_a_phase_of_its_own() {
+        assert!(on(&stop(Noise::TYPICAL, 4), &Variable::WheelAngle).is_empty());
     }
 }
