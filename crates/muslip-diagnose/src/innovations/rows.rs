@@ -158,7 +158,11 @@ fn rows_beside<T: Listed>(
     state: State<T>,
 ) -> Rows<T> {
     let acting = |stage: Stage| acting(catalogue, model, p, series, context, stage);
-    let force = Force::new(series, &state);
+    let acts = |stage: Stage| {
+        let mut terms = model.terms.iter();
+        terms.any(|term| catalogue.get(term.entry).acts_at(stage))
+    };
+    let force = Force::new(series, &state, acts(Stage::Vehicle) || acts(Stage::Wheel));
     let wheel = match (&series.torque, series.wheel_balance.is_empty()) {
         (Some(torque), false) => {
             let acting = acting(Stage::Wheel);
@@ -182,13 +186,16 @@ fn rows_beside<T: Listed>(
 struct Force<'a, T> {
     series: &'a Series,
     added: Option<Vec<T>>,
-    /// The reading without its own noise.
-    quiet: Vec<f64>,
+    /// The reading without its own noise, where something may scale it.
+    quiet: Option<Vec<f64>>,
 }
 
 impl<'a, T: Number> Force<'a, T> {
-    fn new(series: &'a Series, tyre: &State<T>) -> Self {
-        let by_law: Vec<f64> = tyre.force.iter().map(|f| f.value()).collect();
+    fn new(series: &'a Series, tyre: &State<T>, scaled: bool) -> Self {
+        let quiet = || {
+            let by_law: Vec<f64> = tyre.force.iter().map(|f| f.value()).collect();
+            calibrated_force(series, &by_law)
+        };
         let added = tyre.contact.as_ref().map(|contact| {
             let samples = 0..series.len();
             samples.map(|k| tyre.force[k] - contact[k]).collect()
@@ -196,7 +203,7 @@ impl<'a, T: Number> Force<'a, T> {
         Self {
             series,
             added,
-            quiet: calibrated_force(series, &by_law),
+            quiet: scaled.then(quiet),
         }
     }
 
@@ -204,9 +211,10 @@ impl<'a, T: Number> Force<'a, T> {
         self.added.as_ref().map_or(T::constant(0.0), |c| c[k])
     }
 
-    /// Without the reading's own noise.
+    /// Without the reading's own noise; nothing where nothing scales it.
     fn quiet(&self, k: usize) -> T {
-        -self.added(k) + self.quiet[k]
+        let quiet = self.quiet.as_ref();
+        quiet.map_or(T::constant(0.0), |quiet| -self.added(k) + quiet[k])
     }
 
     /// Where the reading's scale is wrong by this. Deviations from the base are made of what does not hold the
