@@ -24,6 +24,7 @@ pub use generate::files::generate;
 pub use generate::strata::Request;
 pub use judge::score::{Report, ScoreRequest, score};
 pub use real::Study;
+pub use report::pace::pace;
 pub use report::trial::{only_measured, trial};
 pub use setup::Trial;
 pub use tool::Tool;

@@ -5,8 +5,8 @@ use std::path::PathBuf;
 use anyhow::{Result, bail};
 use clap::{Args, Parser, Subcommand};
 use sealed_trial::{
-    Compensation, Request, ScoreRequest, Tool, Trial, compensation, generate, only_measured, score,
-    trial,
+    Compensation, Request, ScoreRequest, Tool, Trial, compensation, generate, only_measured, pace,
+    score, trial,
 };
 
 /// Seeds from here on are reported on, and not developed against.
@@ -128,6 +128,21 @@ enum Command {
     Run(RunArguments),
     /// Only what `run` does with measured recordings; writes reality.md and its pictures where `--out` is given.
     Measured(RunArguments),
+    /// Only how long `run` finds a diagnosis to take, on two threads, and how much memory.
+    Pace {
+        /// The tool under trial.
+        #[arg(long, default_value = "target/release/muslip")]
+        muslip: PathBuf,
+        /// Campaigns of six runs of 5,000 samples.
+        #[arg(long, default_value_t = 20)]
+        six: usize,
+        /// Leave out the diagnosis of ten million samples.
+        #[arg(long)]
+        no_ten_million: bool,
+        /// Scratch directory.
+        #[arg(long, default_value = "target/pace")]
+        work: PathBuf,
+    },
 }
 
 #[derive(Args)]
@@ -272,6 +287,18 @@ fn main() -> Result<()> {
             if let Some(docs) = &run.out {
                 study.write(docs)?;
             }
+        }
+        Command::Pace {
+            muslip,
+            six,
+            no_ten_million,
+            work,
+        } => {
+            let tool = Tool {
+                path: muslip,
+                diagnose_arguments: Vec::new(),
+            };
+            print!("{}", pace(&tool, &work, six, !no_ten_million)?);
         }
     }
     Ok(())

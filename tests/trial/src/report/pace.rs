@@ -8,7 +8,7 @@ use std::io::{BufWriter, Write as _};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, bail};
 use serde::{Deserialize, Serialize};
 
 use crate::draw::Draw;
@@ -122,6 +122,18 @@ pub fn paces(tool: &Tool, work: &Path, six: usize, ten_million: bool) -> Result<
         )?);
     }
     Ok(found)
+}
+
+/// The same as a table to print.
+///
+/// # Errors
+/// Recordings that cannot be written, and a diagnosis that fails.
+pub fn pace(tool: &Tool, work: &Path, six: usize, ten_million: bool) -> Result<String> {
+    let found = paces(tool, work, six, ten_million)?;
+    if let Some(complaint) = found.iter().find_map(|pace| pace.complaint.as_ref()) {
+        bail!("{complaint}");
+    }
+    Ok(table(&found).text())
 }
 
 /// Wall times and memory beside their bars.
