@@ -314,7 +314,7 @@ mod tests {
         };
         let mut data = stop(exact, 4);
         // A brake that is read without noise needs no smoothing.
-        for torque in &mut data.series[0].torque {
+        if let Some(torque) = &mut data.series[0].torque {
             torque.smooth.clone_from(&torque.raw);
         }
         data.series.push(data.series[0].clone());
