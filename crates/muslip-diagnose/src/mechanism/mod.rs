@@ -51,6 +51,7 @@ pub use describe::{
 };
 pub use guide::{Alias, Compensation, Example, Guide, Kind, Memory, Sign};
 pub use id::Id;
+pub use once_a_turn::resolves_angle;
 pub use state::{Law, State};
 
 pub use crate::balance::Balance;
@@ -108,7 +109,7 @@ pub fn catalogue<T: Number>() -> Vec<Box<dyn Mechanism<T>>> {
     );
     all.extend(wear_drift::FORMS.map(|form| entry(wear_drift::WearDrift { form })));
     all.extend(zero_drift::FORMS.map(|form| entry(zero_drift::ZeroDrift { form })));
-    all.extend(run_out::Of::all().map(entry));
+    all.extend(run_out::RunOut::all().map(entry));
     all.extend(once_a_turn::FORMS.map(|form| entry(encoder_ripple::EncoderRipple { form })));
     all.extend(bearing_drag::FORMS.map(|form| entry(bearing_drag::BearingDrag { form })));
     all.push(entry(vehicle_speed_delay::VehicleSpeedDelay));

@@ -22,6 +22,12 @@ pub fn radius_reads_as_ripple(series: &[Series]) -> bool {
     series.iter().all(|s| s.wheel_balance.is_empty())
 }
 
+/// Whether the samples resolve so many orders of the wheel's angle.
+#[must_use]
+pub fn resolves_angle(context: &Context, orders: usize) -> bool {
+    context.dt * context.mean_wheel_speed * orders as f64 <= MOST_ADVANCE
+}
+
 /// All forms.
 pub const FORMS: [Form; 3] = [
     Form {
@@ -76,8 +82,7 @@ impl Form {
     /// No ripple; no start where the samples do not resolve the wheel's angle, or one run has a phase of its own.
     #[must_use]
     pub fn starts(self, context: &Context) -> Vec<Vec<f64>> {
-        let advance = context.dt * context.mean_wheel_speed * self.orders as f64;
-        if (self.phase_per_run && context.runs < 2) || advance > MOST_ADVANCE {
+        if (self.phase_per_run && context.runs < 2) || !resolves_angle(context, self.orders) {
             return Vec::new();
         }
         vec![vec![0.0; self.width() * self.phases(context)]]

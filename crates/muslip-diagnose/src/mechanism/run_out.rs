@@ -22,14 +22,6 @@ pub enum Of {
 }
 
 impl Of {
-    /// All of them, with each of these orders and phases that is told apart.
-    pub fn all() -> impl Iterator<Item = RunOut> {
-        [Self::Drag, Self::Load, Self::Radius]
-            .into_iter()
-            .flat_map(|of| FORMS.map(|form| RunOut { form, of }))
-            .filter(|own| own.of == Self::Drag || own.form.orders == 1)
-    }
-
     fn word(self, form: Form) -> &'static str {
         match (self, form.phase_per_run) {
             (Self::Drag, _) => form.as_str(),
@@ -64,6 +56,16 @@ pub struct RunOut {
     pub of: Of,
 }
 
+impl RunOut {
+    /// All forms: of each, the orders and phases that are told apart.
+    pub fn all() -> impl Iterator<Item = Self> {
+        [Of::Drag, Of::Load, Of::Radius]
+            .into_iter()
+            .flat_map(|of| FORMS.map(|form| Self { form, of }))
+            .filter(|own| own.of == Of::Drag || own.form.orders == 1)
+    }
+}
+
 impl Describe for RunOut {
     fn facts(&self) -> Facts {
         let (stage, equation) = match self.of {
@@ -73,7 +75,7 @@ impl Describe for RunOut {
             ),
             Of::Load => (
                 Stage::Contact,
-                "drag = normal_force (mu(slip) + a cos(angle) + b sin(angle))",
+                "drag = normal_force (mu(slip) + a cos(angle) + b sin(angle)) of a wheel that rolls",
             ),
             Of::Radius => (
                 Stage::Kinematics,
@@ -144,8 +146,13 @@ impl<T: Number> Mechanism<T> for RunOut {
                     }
                 }
                 Of::Load => {
-                    for ((force, load), r) in state.force.iter_mut().zip(&state.load).zip(ripple) {
-                        *force += *load * r;
+                    // A wheel that does not roll turns no unequal part into the contact.
+                    for (k, r) in ripple
+                        .into_iter()
+                        .enumerate()
+                        .filter(|(k, _)| series.rolling[*k])
+                    {
+                        state.force[k] += state.load[k] * r;
                     }
                 }
                 Of::Radius => {
@@ -198,8 +205,30 @@ mod tests {
     }
 
     #[test]
+    fn a_share_of_the_load_adds_nothing_at_a_standstill() {
+        let run_out = RunOut {
+            form: FORMS[0],
+            of: Of::Load,
+        };
+        let series = Series {
+            angle: vec![0.0, 0.0, 0.5],
+            rolling: vec![false, true, true],
+            ..Series::default()
+        };
+        let mut state = State {
+            force: vec![0.0; 3],
+            load: vec![1000.0; 3],
+            ..State::empty()
+        };
+        run_out.apply(&[0.1, 0.2], &series, &Context::default(), &mut state);
+        let later = 1000.0 * (0.1 * 0.5f64.cos() + 0.2 * 0.5f64.sin());
+        assert_eq!(state.force[..2], [0.0, 100.0]);
+        assert!((state.force[2] - later).abs() < 1e-9);
+    }
+
+    #[test]
     fn every_form_has_a_word_of_its_own() {
-        let mut words: Vec<&str> = Of::all().map(|own| own.of.word(own.form)).collect();
+        let mut words: Vec<&str> = RunOut::all().map(|own| own.of.word(own.form)).collect();
         let all = words.len();
         words.sort_unstable();
         words.dedup();
