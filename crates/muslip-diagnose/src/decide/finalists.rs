@@ -252,17 +252,21 @@ impl<'a> Screen<'a> {
         out
     }
 
-    /// The best free dependence of either level, by candidate.
+    /// The best free dependence of either level, by candidate; where that is one for each run by itself, whose many
+    /// columns follow anything, the best of the others as well.
     fn dependences(&self) -> Vec<usize> {
         let first = self.table.candidates.len() - self.free.len();
         let mut out: Vec<usize> = Vec::new();
         for (all, _) in &self.levels {
-            if let Some(score) = all.iter().find(|s| s.candidate >= first)
-                && !out.contains(&score.candidate)
-            {
-                out.push(score.candidate);
+            let mut best = all.iter().filter_map(|s| s.candidate.checked_sub(first));
+            let mut taken: Vec<usize> = best.by_ref().take(1).collect();
+            if taken.iter().all(|own| self.free[*own].is_per_run()) {
+                taken.extend(best.find(|own| !self.free[*own].is_per_run()));
             }
+            out.extend(taken.iter().map(|own| first + own));
         }
+        out.sort_unstable();
+        out.dedup();
         out
     }
 

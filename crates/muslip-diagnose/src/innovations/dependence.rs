@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use super::rows::Triple;
 use crate::correction::{Action, Levers, hat, knots_among};
 use crate::data::Data;
-use crate::mechanism::Balance;
+use crate::mechanism::{Balance, resolves_angle};
 use crate::number::finite_or_zero;
 use crate::repaired::Correction;
 use crate::series::Series;
@@ -20,8 +20,6 @@ const KNOTS: usize = 7;
 const LEAST_KNOTS: usize = 3;
 /// Fewest values that knots are set among.
 const LEAST_SAMPLES: usize = 30;
-/// Largest advance of the wheel's angle from one sample to the next that shows what varies with it, in rad.
-const MOST_ADVANCE: f64 = 2.0;
 
 /// A dependence of one balance on one variable, as columns.
 #[derive(Clone)]
@@ -49,7 +47,10 @@ enum Shape {
     },
     /// A wave once a turn of the wheel, for each run from an angle of its own: where the wheel stood at the start is not
     /// known. Of the brake's torque, for it is a disc or a drum that turns.
-    Wave,
+    Wave {
+        /// The runs that show it.
+        runs: Vec<usize>,
+    },
 }
 
 /// Columns of these dependences together.
@@ -156,13 +157,14 @@ fn on(data: &Data, variable: &Variable) -> Vec<Dependence> {
 /// What varies with the wheel's angle in a balance: of the brake, where samples and runs show it. The tyre's and the
 /// wheel speed's have names.
 fn wave(data: &Data, balance: Balance, angles: &Arc<Vec<Vec<f64>>>) -> Option<Dependence> {
-    let resolved = data.context.dt * data.context.mean_wheel_speed < MOST_ADVANCE;
-    let shown = balance == Balance::Wheel && resolved && data.series.len() > 1;
-    shown.then(|| Dependence {
+    let shown = |run: &usize| !data.series[*run].segments(balance).is_empty();
+    let runs: Vec<usize> = (0..data.series.len()).filter(shown).collect();
+    let of_brake = balance == Balance::Wheel && resolves_angle(&data.context, 1);
+    (of_brake && runs.len() > 1).then(|| Dependence {
         balance,
         variable: Variable::WheelAngle,
         action: Action::Force,
-        shape: Shape::Wave,
+        shape: Shape::Wave { runs },
         values: Arc::clone(angles),
     })
 }
@@ -199,14 +201,14 @@ impl Dependence {
     pub fn width(&self) -> usize {
         match &self.shape {
             Shape::Hats { knots, reference } => knots.len() - usize::from(reference.is_some()),
-            Shape::Wave => 2 * self.values.len(),
+            Shape::Wave { runs } => 2 * runs.len(),
         }
     }
 
     /// Whether what it is belongs to each run alone.
     #[must_use]
     pub fn is_per_run(&self) -> bool {
-        matches!(self.shape, Shape::Wave)
+        matches!(self.shape, Shape::Wave { .. })
     }
 
     /// Columns on one run beside the model that the levers are of: minus the lever times each function in the tyre's
@@ -215,7 +217,7 @@ impl Dependence {
     pub fn columns(&self, data: &Data, levers: &Levers, run: usize) -> Vec<Triple> {
         match &self.shape {
             Shape::Hats { knots, reference } => self.of_hats(data, levers, run, knots, *reference),
-            Shape::Wave => self.of_wave(data, run),
+            Shape::Wave { runs } => self.of_wave(data, runs, run),
         }
     }
 
@@ -252,11 +254,12 @@ impl Dependence {
     }
 
     /// Cosine and sine of each run's own wave: nothing on the others.
-    fn of_wave(&self, data: &Data, run: usize) -> Vec<Triple> {
+    fn of_wave(&self, data: &Data, runs: &[usize], run: usize) -> Vec<Triple> {
         let (s, angle) = (&data.series[run], &self.values[run]);
         let mut all = vec![Triple::default(); self.width()];
-        if let Some(torque) = &s.torque {
-            for (own, part) in all[2 * run..].iter_mut().zip([f64::cos, f64::sin]) {
+        let place = runs.iter().position(|own| *own == run);
+        if let (Some(place), Some(torque)) = (place, &s.torque) {
+            for (own, part) in all[2 * place..].iter_mut().zip([f64::cos, f64::sin]) {
                 *own = self.triple(s, integral(s, |k| part(angle[k]) * torque.smooth[k]));
             }
         }
@@ -272,28 +275,24 @@ impl Dependence {
         triple
     }
 
-    /// The correction of a repaired model, from the columns' coefficients.
+    /// The correction of a repaired model, from the columns' coefficients; none for what is no function of the variable.
     #[must_use]
-    pub fn correction(&self, data: &Data, coefficients: &[f64]) -> Correction {
-        let mut values = coefficients.to_vec();
-        let knots = match &self.shape {
-            Shape::Hats { knots, reference } => {
-                if let Some(reference) = reference {
-                    values.insert(*reference, 0.0);
-                }
-                knots.clone()
-            }
-            // No balance but the brake's has one.
-            Shape::Wave => Vec::new(),
+    pub fn correction(&self, data: &Data, coefficients: &[f64]) -> Option<Correction> {
+        let Shape::Hats { knots, reference } = &self.shape else {
+            return None;
         };
-        Correction {
+        let mut values = coefficients.to_vec();
+        if let Some(reference) = reference {
+            values.insert(*reference, 0.0);
+        }
+        Some(Correction {
             variable: self.variable.key(data),
             acts_on: self.action.as_str().to_owned(),
             form: String::new(),
-            knots,
+            knots: knots.clone(),
             values,
             harmonics: Vec::new(),
-        }
+        })
     }
 }
 
@@ -345,6 +344,14 @@ mod tests {
 
     #[test]
     fn one_run_shows_no_wave_of_a_phase_of_its_own() {
-        assert!(on(&stop(Noise::TYPICAL, 4), &Variable::WheelAngle).is_empty());
+        let mut data = stop(Noise::TYPICAL, 4);
+        assert!(on(&data, &Variable::WheelAngle).is_empty());
+        // Nor does one beside another whose wheel's balance is not formed.
+        let mut silent = data.series[0].clone();
+        silent.wheel_balance.clear();
+        data.series.insert(0, silent);
+        assert!(on(&data, &Variable::WheelAngle).is_empty());
+        data.series.push(data.series[1].clone());
+        assert_eq!(on(&data, &Variable::WheelAngle)[0].width(), 4);
     }
 }

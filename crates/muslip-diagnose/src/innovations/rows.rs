@@ -132,15 +132,17 @@ pub fn moved_rows<T: Listed>(
     }
 }
 
+/// Whether a mechanism acts on wheel or vehicle.
+fn acts_on_speeds(catalogue: &Catalogue, entry: usize) -> bool {
+    let mechanism = catalogue.get(entry);
+    mechanism.acts_at(Stage::Vehicle) || mechanism.acts_at(Stage::Wheel)
+}
+
 /// Whether any term changes the rows of wheel or vehicle: what it adds to the reading, what the speeds are read off by,
 /// what acts on wheel or vehicle.
 fn moves_speeds<T: Listed>(catalogue: &Catalogue, model: &Model, tyre: &State<T>) -> bool {
     let moves = |entry: usize| {
-        let mechanism = catalogue.get(entry);
-        mechanism.stage() == Stage::Kinematics
-            || [Stage::Vehicle, Stage::Wheel]
-                .into_iter()
-                .any(|stage| mechanism.acts_at(stage))
+        catalogue.get(entry).stage() == Stage::Kinematics || acts_on_speeds(catalogue, entry)
     };
     tyre.contact.is_some()
         || tyre.rolling_moment.is_some()
@@ -158,11 +160,9 @@ fn rows_beside<T: Listed>(
     state: State<T>,
 ) -> Rows<T> {
     let acting = |stage: Stage| acting(catalogue, model, p, series, context, stage);
-    let acts = |stage: Stage| {
-        let mut terms = model.terms.iter();
-        terms.any(|term| catalogue.get(term.entry).acts_at(stage))
-    };
-    let force = Force::new(series, &state, acts(Stage::Vehicle) || acts(Stage::Wheel));
+    let mut terms = model.terms.iter();
+    let scaled = terms.any(|term| acts_on_speeds(catalogue, term.entry));
+    let force = Force::new(series, &state, scaled);
     let wheel = match (&series.torque, series.wheel_balance.is_empty()) {
         (Some(torque), false) => {
             let acting = acting(Stage::Wheel);

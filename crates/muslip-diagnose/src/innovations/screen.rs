@@ -18,7 +18,7 @@ pub struct Score {
     pub sizes: Vec<f64>,
 }
 
-/// Prior standard deviation of a free dependence at a knot, as a share of the friction or of the mean load.
+/// Prior standard deviation of a free dependence at a knot, as a share of the friction, of the mean load or of the torque.
 const FREE_STD: f64 = 0.5;
 
 /// Prior precision of a column of the table (residual included).

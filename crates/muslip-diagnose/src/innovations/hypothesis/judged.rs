@@ -89,7 +89,7 @@ impl Judged {
         self.dependences()
             .into_iter()
             .filter(|(own, _)| own.balance == Balance::Tyre)
-            .map(|(own, coefficients)| own.correction(data, &coefficients))
+            .filter_map(|(own, coefficients)| own.correction(data, &coefficients))
             .collect()
     }
 
