@@ -138,7 +138,8 @@ pub(crate) fn sentence(text: &str) -> String {
 pub struct Evidence {
     /// Twice the drop in the criterion when it is left out.
     pub delta_bic: f64,
-    /// Gain in log likelihood a sample on held-out data when it is added.
+    /// Gain in log likelihood a sample on unseen runs when it is added, at the noise at which it stands: as fitted, or no
+    /// larger than the sensors make plausible where the runs' own differences hide it.
     pub holdout_nll_gain_per_sample: f64,
     /// Posterior probability, 0..=1.
     pub confidence: f64,

@@ -16,7 +16,7 @@ use crate::data::Data;
 use crate::innovations::dependence::{self, Dependence};
 use crate::innovations::hypothesis::{Guess, Judged, judge, judge_added};
 use crate::looked::Seen;
-use crate::mechanism::Id;
+use crate::mechanism::{Balance, Id};
 use crate::model::Model;
 
 /// Most names.
@@ -153,13 +153,13 @@ fn next<'a>(data: &Data, trials: &'a [Trial], before: &TakenUp) -> Option<&'a Tr
     });
     // Much more at the sensors' noise, too: what the runs' own differences hide of a name says nothing against it.
     let much_more = |own: f64, than: f64| own > DEPENDENCE_SHARE * than + DEPENDENCE_NATS;
-    let touched = named.mechanism().map_or(&[][..], |(_, entry)| {
-        data.catalogue.get(entry).guide().touches
-    });
+    let touched = |balance: Balance| {
+        let mechanism = named.mechanism();
+        mechanism
+            .is_some_and(|(_, entry)| data.catalogue.get(entry).guide().touches.contains(&balance))
+    };
     let instead = |t: &&Trial| {
-        let balance = t.claim.balance(data);
-        let of_same = balance == named.claim.balance(data) || touched.contains(&balance);
-        of_same
+        touched(t.claim.balance(data))
             && much_more(t.weight(), named.weight())
             && much_more(t.at_sensors.0, named.at_sensors.0)
     };

@@ -118,15 +118,14 @@ impl Trial {
         (self.gain.max(least) * self.at_sensors.0.max(0.0)).sqrt()
     }
 
-    /// What all unseen runs gain by it in nats: at the noise as fitted, or at the sensors' where the runs' own differences
-    /// hide it.
+    /// What all unseen runs gain by it in nats, at the noise at which it stands: as fitted, or at the sensors' where the
+    /// runs' own differences hide it.
     #[must_use]
     pub fn gain_on_unseen_runs(&self, runs: usize) -> f64 {
-        let fitted = self.unseen.0 * runs as f64;
-        if fitted > 0.0 {
-            fitted
-        } else {
+        if hidden(self) && !seen_on_unseen_runs(self) {
             self.at_sensors.0
+        } else {
+            self.unseen.0 * runs as f64
         }
     }
 
@@ -169,6 +168,13 @@ fn mean_and_t(gains: &[f64]) -> (f64, f64) {
 fn sum_and_t(gains: &[f64]) -> (f64, f64) {
     let roots: Vec<f64> = gains.iter().map(|g| g.signum() * g.abs().sqrt()).collect();
     (gains.iter().sum(), mean_and_t(&roots).1)
+}
+
+/// Whether a claim may be what a name leaves, by whether that is a memory of the force and whether a chain feeds the
+/// claim, where it is a mechanism: what such a memory leaves looks like what a chain leaves, or like a dependence on a
+/// rate, but like no other mechanism.
+fn may_leave(memory_of_force: bool, fed_by_chain: Option<bool>) -> bool {
+    !memory_of_force || fed_by_chain != Some(false)
 }
 
 /// Whether hardly any of these speaks against what all together show. An effect that few runs reach, a channel's limit
@@ -223,14 +229,13 @@ impl<'a> Before<'a> {
         let balance = claim.balance(data);
         let fed_by_chain = claim
             .mechanism()
-            .is_some_and(|(_, entry)| data.catalogue.get(entry).fed_by_chain());
-        // What a memory leaves looks like what a chain leaves, not like what it does not.
+            .map(|(_, entry)| data.catalogue.get(entry).fed_by_chain());
         let leaves_alike = |term: &Term| {
             let mechanism = data.catalogue.get(term.entry);
-            fed_by_chain
-                || mechanism
-                    .memory_s(&term.parameters, &data.context)
-                    .is_none()
+            let remembers = mechanism
+                .memory_s(&term.parameters, &data.context)
+                .is_some();
+            may_leave(remembers && mechanism.facts().through_force, fed_by_chain)
         };
         let named = base.model.terms.iter().any(|t| {
             let term = data.catalogue.get(t.entry);
@@ -285,7 +290,7 @@ impl<'a> Before<'a> {
             own,
             says_as_well: term
                 .and_then(|(_, entry, p)| data.catalogue.get(entry).says_as_well(p, &data.context)),
-            fed_by_chain,
+            fed_by_chain: fed_by_chain == Some(true),
             remembers: memory_s.is_some(),
             outlasts_chain: memory_s
                 .is_none_or(|(memory, least)| memory > least.max(chain_s) && memory < longest_s),
@@ -476,6 +481,14 @@ mod tests {
         assert_eq!(gains(&before, &with, false), [3.0, -1.0]);
         // Halves that the claim says nothing of are no evidence either way.
         assert_eq!(gains(&before, &with, true), [1.0, -0.5]);
+    }
+
+    #[test]
+    fn a_memory_of_the_force_leaves_nothing_like_what_no_chain_leaves() {
+        let (memory, load, lag, dependence) = (true, Some(false), Some(true), None);
+        assert!(!may_leave(memory, load));
+        assert!(may_leave(memory, lag) && may_leave(memory, dependence));
+        assert!(may_leave(!memory, load) && may_leave(!memory, lag));
     }
 
     #[test]
