@@ -28,8 +28,8 @@ use crate::split::Split;
 /// Share of the work that is done when all is decided.
 const DECIDED: f64 = 0.9;
 
-/// Samples above which neighbours are averaged first: memory and time would grow without telling more of anything
-/// but the fastest effects.
+/// Samples above which neighbours are averaged first: memory and time would grow with them. What is lost is faster than the
+/// means, and a caveat says so.
 const MOST_SAMPLES: usize = 100_000;
 
 /// Diagnoses a campaign of recordings: the measuring chain first, then physics on innovations. Deterministic: the
