@@ -258,12 +258,9 @@ impl<'a> Screen<'a> {
         let first = self.table.candidates.len() - self.free.len();
         let mut out: Vec<usize> = Vec::new();
         for (all, _) in &self.levels {
-            let mut best = all.iter().filter_map(|s| s.candidate.checked_sub(first));
-            let mut taken: Vec<usize> = best.by_ref().take(1).collect();
-            if taken.iter().all(|own| self.free[*own].is_per_run()) {
-                taken.extend(best.find(|own| !self.free[*own].is_per_run()));
-            }
-            out.extend(taken.iter().map(|own| first + own));
+            let best = || all.iter().map(|s| s.candidate).filter(|own| *own >= first);
+            out.extend(best().next());
+            out.extend(best().find(|own| !self.free[own - first].is_per_run()));
         }
         out.sort_unstable();
         out.dedup();
