@@ -305,13 +305,7 @@ mod tests {
 
     #[test]
     fn a_wave_s_columns_are_what_a_torque_that_varies_with_the_wheel_s_angle_changes() {
-        let exact = Noise {
-            wheel: 0.0,
-            drag: 0.0,
-            load: 0.0,
-            torque: 0.0,
-        };
-        let mut data = stop(exact, 4);
+        let mut data = stop(Noise::NONE, 4);
         // A brake that is read without noise needs no smoothing.
         if let Some(torque) = &mut data.series[0].torque {
             torque.smooth.clone_from(&torque.raw);

@@ -306,15 +306,7 @@ mod tests {
     #[test]
     fn what_the_reading_says_of_the_law_mends_the_law_and_brings_little_noise() {
         let data = stop(Noise::TYPICAL, 4);
-        let exact = stop(
-            Noise {
-                wheel: 0.0,
-                drag: 0.0,
-                load: 0.0,
-                torque: 0.0,
-            },
-            4,
-        );
+        let exact = stop(Noise::NONE, 4);
         let (series, truth) = (&data.series[0], &exact.series[0].drag);
         // The law is exact: what is brought in is the reading's noise.
         let exact = calibrated_force(series, truth);
@@ -334,11 +326,7 @@ mod tests {
 
     #[test]
     fn a_scale_of_the_drag_in_error_is_right_beside_a_law_that_is_off() {
-        let noise = Noise {
-            wheel: 0.02,
-            ..Noise::TYPICAL
-        };
-        let mut data = stop(noise, 4);
+        let mut data = stop(Noise::FINE_WHEEL, 4);
         // What the law's slip is made of is off by turns, by up to a fifth of the slip at the peak.
         let series = &mut data.series[0];
         for (omega, time) in series.wheel.smooth.iter_mut().zip(&series.time) {

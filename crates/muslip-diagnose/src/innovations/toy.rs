@@ -36,6 +36,18 @@ impl Noise {
         load: 40.0,
         torque: 5.0,
     };
+    /// The same with a wheel speed that is read far better.
+    pub const FINE_WHEEL: Self = Self {
+        wheel: 0.02,
+        ..Self::TYPICAL
+    };
+    /// None.
+    pub const NONE: Self = Self {
+        wheel: 0.0,
+        drag: 0.0,
+        load: 0.0,
+        torque: 0.0,
+    };
 }
 
 /// What stands between a stop and its recording, each a time constant in s.

@@ -153,11 +153,7 @@ mod tests {
     #[test]
     fn an_inertia_s_error_is_right_by_all_of_the_level() {
         // The wheel's is a fifth more than the rig file's.
-        let noise = Noise {
-            wheel: 0.02,
-            ..Noise::TYPICAL
-        };
-        let mut data = stop(noise, 4);
+        let mut data = stop(Noise::FINE_WHEEL, 4);
         data.context.inertia = 1.0;
         let judged = |data: &Data| {
             let model = with_term(data, &settled(data), Id::WheelInertia, 0.1);
