@@ -10,7 +10,7 @@ use super::finding::Timing;
 use super::recording::{Block, Recording, blocks, spans};
 use super::signal::{Signal, low_pass};
 use super::squares::{Balance, Solution, recoloured, refine};
-use super::vehicle::{constants_of, impulse_like, powers};
+use super::vehicle::{level_like, powers};
 use crate::campaign::Rig;
 use crate::slip::slip;
 
@@ -70,6 +70,16 @@ const COARSE_S: f64 = 0.015;
 const SPEED_M_S: f64 = 15.0;
 /// Farthest that the refinement may take the wheel speed's delay from the coarse scan's, s.
 const ASTRAY_S: f64 = 0.025;
+
+/// Splits a signed second moment into the time constants of the first channel's and the second channel's filter.
+fn constants_of(moment: f64) -> (f64, f64) {
+    let size = moment.abs().sqrt();
+    if moment > 0.0 {
+        (size, 0.0)
+    } else {
+        (0.0, size)
+    }
+}
 
 impl Law<'_> {
     /// Drag by the law and drag as read, on the block's grid; inputs are means over a width in s.
@@ -207,7 +217,7 @@ fn speed(rig: &Rig, run: &Recording, vehicle: Timing, moment: f64) -> Signal {
     let grid = (*first, step, count);
     let scale = 1.0 / rig.mass_kg;
     let impulse = |late: f64, moment: f64| -> Vec<f64> {
-        impulse_like(run, grid, late, moment)
+        level_like(&run.drag.signal, grid, late, moment)
             .iter()
             .map(|i| i * scale)
             .collect()

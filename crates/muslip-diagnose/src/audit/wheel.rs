@@ -1,17 +1,16 @@
 //! The wheel's balance in level form: J ω(t) against the impulses of drag and brake.
 
 use super::constants::{
-    COARSE_STEP_S, FEWEST_BLOCKS, MOMENT_S2, MOST_ROWS, WHEEL_RANGE_S, WHEEL_STEP_S,
+    BRAKE_MOMENT_S2, COARSE_STEP_S, FEWEST_BLOCKS, MOST_ROWS, WHEEL_RANGE_S, WHEEL_STEP_S,
 };
 use super::finding::Timing;
 use super::recording::{Block, Recording, blocks};
-use super::signal::low_pass;
 use super::squares::{Balance, Solution, recoloured, refine, scan_value};
-use super::vehicle::{constants_of, parabolas};
+use super::vehicle::{level_like, parabolas};
 use crate::campaign::Rig;
 
 /// Unknowns: scale of both impulses, the brake's against the drag's, delay of ω and of the brake in s, second moment by which
-/// ω is slower in s².
+/// the brake column is slower than both in s² (negative where it is a lag of the brake that makes it early).
 struct Wheel<'a> {
     runs: &'a [Recording],
     blocks: Vec<Block>,
@@ -44,43 +43,36 @@ impl Wheel<'_> {
         x: &[f64],
         smoothed: Option<&[f64]>,
     ) -> Vec<f64> {
-        let (slower, faster) = constants_of(x[4]);
-        let shift = x[2] - slower + faster;
         let ahead = (RUN_UP_S / self.step) as usize;
         let start = block.start - ahead as f64 * self.step;
         let count = block.count + ahead;
         let inertia = self.rig.wheel_inertia_kg_m2;
-        let brake_at = |late: f64| -> Vec<f64> {
+        let brake_at = |late: f64, moment: f64| -> Vec<f64> {
             let Some((_, brake)) = &run.brake else {
                 return vec![0.0; count];
             };
-            let level = brake.signal.levels(start - shift + late, self.step, count);
+            let grid = (start - x[2], self.step, count);
+            let level = level_like(&brake.signal, grid, -late, -moment);
             level.iter().map(|l| (l - level[0]) / inertia).collect()
         };
-        let brake = brake_at(x[3]);
-        let level: Vec<f64> = if let Some(base) = smoothed {
+        let brake = brake_at(x[3], x[4]);
+        let drag: Vec<f64> = if let Some(base) = smoothed {
             let wheel =
                 run.wheel
                     .signal
-                    .averages(start - shift + base[2], self.step, count, INSTRUMENT_S);
-            let kept = brake_at(base[3]);
-            (0..count)
-                .map(|k| x[0] * (wheel[k] + base[1] * kept[k] - x[1] * brake[k]))
-                .collect()
+                    .averages(start - x[2] + base[2], self.step, count, INSTRUMENT_S);
+            let kept = brake_at(base[3], base[4]);
+            let both = wheel.iter().zip(&kept);
+            both.map(|(wheel, kept)| wheel + base[1] * kept).collect()
         } else {
-            let drag = run.drag.signal.levels(start - shift, self.step, count);
+            let drag = run.drag.signal.levels(start - x[2], self.step, count);
             let share = self.rig.radius_m / inertia;
-            (0..count)
-                .map(|k| x[0] * (share * (drag[k] - drag[0]) - x[1] * brake[k]))
-                .collect()
+            drag.iter().map(|d| share * (d - drag[0])).collect()
         };
-        let level = low_pass(&level, self.step, slower);
-        let omega = low_pass(
-            &run.wheel.signal.means(start, self.step, count),
-            self.step,
-            faster,
-        );
-        (ahead..count).map(|k| omega[k] - level[k]).collect()
+        let omega = run.wheel.signal.means(start, self.step, count);
+        (ahead..count)
+            .map(|k| omega[k] - x[0] * (drag[k] - x[1] * brake[k]))
+            .collect()
     }
 }
 
@@ -107,7 +99,7 @@ impl Balance for Wheel<'_> {
             (1.0, 0.3),
             (0.0, f64::INFINITY),
             (0.0, f64::INFINITY),
-            (0.0, MOMENT_S2),
+            (0.0, BRAKE_MOMENT_S2),
         ]
     }
 }
@@ -175,7 +167,82 @@ pub fn wheel(rig: &Rig, runs: &[Recording], known: Timing) -> Option<Solution> {
         })
         .min_by(|a, b| a.0.total_cmp(&b.0))?;
     let start = [1.0, 1.0, best.1, best.2, 0.0];
-    let fixed = [false, false, false, false, true];
-    let at = refine(&balance, &start, &[0.98], 4, &fixed)?;
-    recoloured(&balance, at, &fixed)
+    let at = refine(
+        &balance,
+        &start,
+        &[0.98],
+        4,
+        &[false, false, false, false, true],
+    )?;
+    recoloured(&balance, at, &[false; 5])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::recording::recording;
+    use super::super::signal::low_pass;
+    use super::super::toy::white;
+    use super::*;
+    use crate::campaign::Run;
+
+    /// A braked wheel whose torque is the brake column through a pole of so many s, and later by so many s.
+    fn run(rig: &Rig, phase: f64, pole: f64, late: f64) -> Run {
+        let (dt, count) = (1e-3, 6000);
+        let time: Vec<f64> = (0..count).map(|k| f64::from(k) * dt).collect();
+        let applied = |t: f64| {
+            let beat = (1.7 * t + phase).sin() + 0.6 * (11.0 * t + 2.0 * phase).sin();
+            400.0 + 150.0 * beat.tanh()
+        };
+        let column: Vec<f64> = time.iter().map(|t| applied(*t)).collect();
+        let torque = low_pass(
+            &time.iter().map(|t| applied(t - late)).collect::<Vec<_>>(),
+            dt,
+            pole,
+        );
+        let rate = |t: f64| 40.0 * (9.0 * t + phase).sin() + 30.0 * (23.0 * t).cos();
+        let mut noise = white(7);
+        let mut noise = |size: f64| size * noise.next().unwrap();
+        let (mut omega, mut wheel, mut drag) = (90.0, Vec::new(), Vec::new());
+        for (t, torque) in time.iter().zip(&torque) {
+            wheel.push(omega + noise(0.1));
+            drag.push((torque + rig.wheel_inertia_kg_m2 * rate(*t)) / rig.radius_m + noise(60.0));
+            omega += dt * rate(*t);
+        }
+        Run {
+            name: "run".to_owned(),
+            vehicle_speed_m_s: vec![30.0; time.len()],
+            normal_force_n: vec![3500.0; time.len()],
+            brake_torque_nm: Some(column.iter().map(|b| b + noise(8.0)).collect()),
+            wheel_speed_rad_s: wheel,
+            drag_force_n: drag,
+            time_s: time,
+            ..Run::default()
+        }
+    }
+
+    #[test]
+    fn a_lag_of_the_brake_is_its_delay_and_its_second_moment_and_no_scale() {
+        let rig = Rig {
+            radius_m: 0.31,
+            wheel_inertia_kg_m2: 1.2,
+            ..Rig::default()
+        };
+        let found = |pole: f64, late: f64| {
+            let runs = [0.0, 1.0, 2.0].map(|phase| recording(&rig, &run(&rig, phase, pole, late)));
+            wheel(&rig, &runs, Timing::UNKNOWN).unwrap().unknowns
+        };
+        for (pole, late) in [(0.0, 0.016), (0.016, 0.0), (0.03, 0.0)] {
+            let x = found(pole, late);
+            assert!(
+                (x[0] - 1.0).abs() < 0.05 && (x[1] - 1.0).abs() < 0.02,
+                "{x:?}"
+            );
+            assert!(x[2].abs() < 1e-3, "{x:?}");
+            assert!((x[3] + pole + late).abs() < 1e-3, "{x:?}");
+            assert!(
+                (x[4] + pole * pole).abs() < 3e-5 + 0.4 * pole * pole,
+                "{x:?}"
+            );
+        }
+    }
 }
