@@ -34,9 +34,7 @@ pub const SLOWEST_SHARE: f64 = 0.15;
 pub const HELD_STEPS: usize = 8;
 /// Share of samples that repeat their predecessor in a held channel, at least.
 pub const HELD_REPEATS: f64 = 0.35;
-/// Standard deviation of what is expected of the second moment between two channels of a rig, s²: filters of 12 Hz.
-pub const MOMENT_S2: f64 = 1.5e-4;
-/// The same of a brake's torque against its column, s²: lags of 30 ms.
+/// Standard deviation of what is expected of the second moment of a brake column against its torque, s²: lags of 30 ms.
 pub const BRAKE_MOMENT_S2: f64 = 1e-3;
 /// Width over which the vehicle's speed is averaged in the tyre's law, s: what is quicker is the drag's impulse.
 pub const SPEED_WIDTH_S: f64 = 0.25;

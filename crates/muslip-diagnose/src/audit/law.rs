@@ -3,14 +3,14 @@
 use rayon::prelude::*;
 
 use super::constants::{
-    FEWEST_BLOCKS, HELD_WIDTH_S, LEAST_FILTER_S, MOMENT_S2, MOST_ROWS, SPEED_WIDTH_S, TOLD_SIGMAS,
+    FEWEST_BLOCKS, HELD_WIDTH_S, LEAST_FILTER_S, MOST_ROWS, SPEED_WIDTH_S, TOLD_SIGMAS,
     WHEEL_RANGE_S, WHEEL_STEP_S,
 };
 use super::finding::Timing;
 use super::recording::{Block, Recording, blocks, spans};
-use super::signal::{Signal, low_pass};
+use super::signal::Signal;
 use super::squares::{Balance, Solution, recoloured, refine};
-use super::vehicle::{level_like, powers};
+use super::vehicle::powers;
 use crate::campaign::Rig;
 use crate::slip::slip;
 
@@ -24,12 +24,10 @@ pub const OFFSET: usize = 2;
 pub const WHEEL: usize = 3;
 /// Delay of the vehicle speed, s.
 pub const VEHICLE: usize = 4;
-/// Second moment by which the speeds are slower than the drag, s².
-pub const MOMENT: usize = 5;
 /// How long the drag's memory is, s or, of a tyre that follows over a length, m.
-pub const LAG: usize = 6;
+pub const LAG: usize = 5;
 /// Number of the unknowns.
-const UNKNOWNS: usize = 7;
+const UNKNOWNS: usize = 6;
 
 /// What keeps the drag back behind the law's force.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -71,21 +69,9 @@ const SPEED_M_S: f64 = 15.0;
 /// Farthest that the refinement may take the wheel speed's delay from the coarse scan's, s.
 const ASTRAY_S: f64 = 0.025;
 
-/// Splits a signed second moment into the time constants of the first channel's and the second channel's filter.
-fn constants_of(moment: f64) -> (f64, f64) {
-    let size = moment.abs().sqrt();
-    if moment > 0.0 {
-        (size, 0.0)
-    } else {
-        (0.0, size)
-    }
-}
-
 impl Law<'_> {
     /// Drag by the law and drag as read, on the block's grid; inputs are means over a width in s.
     fn series(&self, block: &Block, x: &[f64], width: f64) -> (Vec<f64>, Vec<f64>) {
-        let (slower, faster) = constants_of(x[MOMENT]);
-        let shift = faster - slower;
         let run = &self.runs[block.run];
         let ahead = (RUN_UP_S / self.step) as usize;
         let start = block.start - ahead as f64 * self.step;
@@ -93,9 +79,9 @@ impl Law<'_> {
         let omega = run
             .wheel
             .signal
-            .averages(start + x[WHEEL] + shift, self.step, count, width);
+            .averages(start + x[WHEEL], self.step, count, width);
         let speed = self.speeds[block.run].averages(
-            start + x[VEHICLE] + shift - self.vehicle.value,
+            start + x[VEHICLE] - self.vehicle.value,
             self.step,
             count,
             if width > self.step && !self.vehicle.std.is_finite() {
@@ -104,10 +90,7 @@ impl Law<'_> {
                 width
             },
         );
-        let load = run
-            .load
-            .signal
-            .averages(start + shift, self.step, count, width);
+        let load = run.load.signal.averages(start, self.step, count, width);
         let critical = x[CRITICAL].exp();
         let law: Vec<f64> = (0..count)
             .map(|k| {
@@ -123,13 +106,8 @@ impl Law<'_> {
             Lag::Length => following(&law, self.step, |k| x[LAG] / speed[k].max(1e-3)),
             Lag::Mean => around(&law, self.step, x[LAG]),
         };
-        let law = low_pass(&law, self.step, faster);
         let own = if self.smooth { INSTRUMENT_S } else { self.step };
-        let drag = low_pass(
-            &run.drag.signal.averages(start, self.step, count, own),
-            self.step,
-            slower,
-        );
+        let drag = run.drag.signal.averages(start, self.step, count, own);
         (law[ahead..].to_vec(), drag[ahead..].to_vec())
     }
 }
@@ -176,7 +154,7 @@ impl Balance for Law<'_> {
     }
 
     fn steps(&self) -> Vec<f64> {
-        vec![1e-3, 1e-3, 1e-4, 5e-4, 1e-3, 2.5e-5, 5e-4]
+        vec![1e-3, 1e-3, 1e-4, 5e-4, 1e-3, 5e-4]
     }
 
     fn prior(&self) -> Vec<(f64, f64)> {
@@ -191,7 +169,6 @@ impl Balance for Law<'_> {
             (0.0, 0.005),
             (0.0, 0.1),
             vehicle,
-            (0.0, MOMENT_S2),
             (0.0, f64::INFINITY),
         ]
     }
@@ -217,7 +194,9 @@ fn speed(rig: &Rig, run: &Recording, vehicle: Timing, moment: f64) -> Signal {
     let grid = (*first, step, count);
     let scale = 1.0 / rig.mass_kg;
     let impulse = |late: f64, moment: f64| -> Vec<f64> {
-        level_like(&run.drag.signal, grid, late, moment)
+        run.drag
+            .signal
+            .levels_later(grid, late, moment)
             .iter()
             .map(|i| i * scale)
             .collect()
@@ -311,7 +290,7 @@ pub fn law(rig: &Rig, runs: &[Recording], vehicle: Timing, moment: f64) -> Optio
     balance.blocks = even(step);
     let begun = start[WHEEL];
     let known = vehicle.std.is_finite();
-    let fixed = [false, false, false, false, known, true, true];
+    let fixed = [false, false, false, false, known, true];
     let at = refine(&balance, &start, &[0.6], 3, &fixed)?;
     let estimate = recoloured(&balance, at, &fixed)?;
     if (estimate.unknowns[WHEEL] - begun).abs() > ASTRAY_S {
@@ -366,7 +345,7 @@ fn coarse(balance: &Law) -> Option<Vec<f64>> {
         .filter_map(|k| {
             let mut x: Vec<f64> = prior.iter().map(|p| p.0).collect();
             x[WHEEL] = WHEEL_RANGE_S.0 + k as f64 * step;
-            let fixed = [false, false, true, false, true, true, true];
+            let fixed = [false, false, true, false, true, true];
             refine(balance, &x, &[0.6], 3, &fixed)
         })
         .min_by(|a, b| a.sum.total_cmp(&b.sum))

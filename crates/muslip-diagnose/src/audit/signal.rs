@@ -2,6 +2,9 @@
 
 use super::constants::{KNOT_S, MOST_KNOTS};
 
+/// Width over which a channel is averaged on either side for its slope, s.
+const CURVATURE_S: f64 = 0.03;
+
 /// A channel by its integral at even knots; between readings it is a straight line, beyond its ends constant.
 #[derive(Clone, Debug, Default)]
 pub struct Signal {
@@ -124,6 +127,29 @@ impl Signal {
                 mean
             })
             .collect()
+    }
+
+    /// Means of the integral on a grid (start, step, number), later by a mean delay in s and wider by a second moment in s²:
+    /// through a pole, whose own delay is part of that; sharpened where the moment is negative.
+    #[must_use]
+    pub fn levels_later(
+        &self,
+        (start, step, count): (f64, f64, usize),
+        delay: f64,
+        moment: f64,
+    ) -> Vec<f64> {
+        let slower = moment.max(0.0).sqrt();
+        let from = start - delay + slower;
+        let mut levels = self.levels(from, step, count);
+        if moment >= 0.0 {
+            return low_pass(&levels, step, slower);
+        }
+        let ahead = self.averages(from + 0.5 * CURVATURE_S, step, count, CURVATURE_S);
+        let behind = self.averages(from - 0.5 * CURVATURE_S, step, count, CURVATURE_S);
+        for ((level, a), b) in levels.iter_mut().zip(ahead).zip(behind) {
+            *level += 0.5 * moment * (a - b) / CURVATURE_S;
+        }
+        levels
     }
 }
 

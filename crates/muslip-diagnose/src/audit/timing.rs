@@ -24,8 +24,6 @@ pub struct Timings {
     pub brake: Timing,
     /// Second moment by which the vehicle speed is slower than the drag, s², and its standard deviation.
     pub vehicle_moment: Option<(f64, f64)>,
-    /// Second moment by which the wheel speed is slower than the drag, s², and its standard deviation.
-    pub wheel_moment: Option<(f64, f64)>,
     /// What the law says of a filter of the drag.
     pub drag_pole: Option<law::Pole>,
     /// What each balance said, for a closer look: vehicle, wheel, law.
@@ -90,7 +88,6 @@ pub fn timings(rig: &Rig, runs: &[Recording]) -> Timings {
         if !out.vehicle.std.is_finite() {
             out.vehicle = delay(&estimate, law::VEHICLE, held_speed, step);
         }
-        out.wheel_moment = Some((estimate.unknowns[law::MOMENT], estimate.std[law::MOMENT]));
         out.estimates[2] = Some(estimate);
     }
     let known = Timing {

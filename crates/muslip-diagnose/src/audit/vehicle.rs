@@ -4,10 +4,10 @@ use super::constants::{
     COARSE_STEP_S, FEWEST_BLOCKS, MOST_ROWS, SHORTEST_BLOCK_S, VEHICLE_RANGE_S, VEHICLE_STEP_S,
 };
 use super::recording::{Block, Recording, blocks, spans};
-use super::signal::{Signal, low_pass};
 use super::squares::{Balance, Solution, recoloured, refine, scan_value};
 
-/// Unknowns: scale of the drag's impulse, delay in s, and signed square of the time constant by which v is slower, s².
+/// Unknowns: scale of the drag's impulse, delay in s, and second moment by which v is slower, s². The speed itself is never
+/// filtered: that would only take its noise away.
 struct Vehicle<'a> {
     runs: &'a [Recording],
     blocks: Vec<Block>,
@@ -18,42 +18,19 @@ struct Vehicle<'a> {
 /// Seconds read ahead of a block, in which filters forget where they started.
 const RUN_UP_S: f64 = 0.4;
 
-/// Width over which the drag is averaged on either side for its slope, s.
-const CURVATURE_S: f64 = 0.03;
-
 impl Vehicle<'_> {
     fn series(&self, block: &Block, delay: f64, moment: f64) -> (Vec<f64>, Vec<f64>) {
         let run = &self.runs[block.run];
         let ahead = (RUN_UP_S / self.step) as usize;
         let start = block.start - ahead as f64 * self.step;
         let count = block.count + ahead;
-        let impulse = level_like(&run.drag.signal, (start, self.step, count), delay, moment);
+        let impulse = run
+            .drag
+            .signal
+            .levels_later((start, self.step, count), delay, moment);
         let speed = run.speed.signal.means(start, self.step, count);
         (speed[ahead..].to_vec(), impulse[ahead..].to_vec())
     }
-}
-
-/// A channel's integral on a grid (start, step, number), later by a delay, and slower by a second moment: through a pole,
-/// or sharpened where that is negative. A speed that it is compared with is never filtered: that would only take its noise
-/// away.
-pub(super) fn level_like(
-    signal: &Signal,
-    (start, step, count): (f64, f64, usize),
-    delay: f64,
-    moment: f64,
-) -> Vec<f64> {
-    let slower = moment.max(0.0).sqrt();
-    let from = start - delay + slower;
-    let mut levels = signal.levels(from, step, count);
-    if moment >= 0.0 {
-        return low_pass(&levels, step, slower);
-    }
-    let ahead = signal.averages(from + 0.5 * CURVATURE_S, step, count, CURVATURE_S);
-    let behind = signal.averages(from - 0.5 * CURVATURE_S, step, count, CURVATURE_S);
-    for ((level, a), b) in levels.iter_mut().zip(ahead).zip(behind) {
-        *level += 0.5 * moment * (a - b) / CURVATURE_S;
-    }
-    levels
 }
 
 impl Balance for Vehicle<'_> {
@@ -124,7 +101,7 @@ pub fn free(runs: &[Recording], mass: f64, found: &Solution, step: f64) -> Vec<V
     grids(runs, step)
         .zip(speeds(runs, step))
         .map(|((run, grid), speed)| {
-            let impulse = level_like(&run.drag.signal, grid, x[1], x[2]);
+            let impulse = run.drag.signal.levels_later(grid, x[1], x[2]);
             let both = speed.iter().zip(&impulse);
             both.map(|(v, i)| v + scale * i).collect()
         })
