@@ -44,8 +44,10 @@ fn one_command_estimates_from_a_bench_s_file_without_a_rig_file() {
         text.contains("100 Hz, brought onto 400 Hz (linear); 3 empty"),
         "{text}"
     );
-    let told = scratch.complaint(&["estimate", BENCH]);
-    assert!(told.contains("add --radius METRES"), "{told}");
+    for command in ["estimate", "fit"] {
+        let told = scratch.complaint(&[command, BENCH]);
+        assert!(told.contains("add --radius METRES"), "{told}");
+    }
 }
 
 #[test]
@@ -55,6 +57,10 @@ fn a_german_csv_is_estimated_and_converted() {
     let json = scratch.json(&words("estimate --radius 0.31 --json lauf.csv"));
     let peak = json["peak_friction"]["value"].as_f64().unwrap();
     assert!((peak - 0.9).abs() < 0.005, "{json:#}");
+    // A fit of all rows at once comes to the same peak.
+    let fitted = scratch.json(&words("fit --radius 0.31 --json lauf.csv"));
+    let fitted = fitted["peak_friction"]["value"].as_f64().unwrap();
+    assert!((fitted - 0.9).abs() < 0.005, "{fitted}");
     scratch.output(&words("convert --out run.csv lauf.csv"));
     let text = scratch.read("run.csv");
     assert_eq!(

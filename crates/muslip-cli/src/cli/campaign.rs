@@ -14,11 +14,12 @@ use muslip_report::{FigureFormat, write_figures};
 use rayon::prelude::*;
 use serde_json::json;
 
-use super::estimate::{Choices, Job, RigSource};
+use super::estimate::{Choices, Job};
 use super::failure::Failure;
 use super::mapping::Mapping;
 use super::progress::Progress;
 use super::records::write_records;
+use super::rig_source::RigSource;
 use super::terminal::Terminal;
 
 /// Estimate many recordings of one rig and compare them: one overview page, one report per run.

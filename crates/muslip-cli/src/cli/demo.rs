@@ -12,8 +12,9 @@ use muslip_report::diagnose::files;
 use muslip_report::diagnose::summary::{WIDEST_LINE, summary};
 
 use super::diagnose::diagnosed;
-use super::estimate::{Job, RigSource, tell};
+use super::estimate::{Job, tell};
 use super::failure::Failure;
+use super::rig_source::RigSource;
 use super::terminal::Terminal;
 use crate::demo;
 

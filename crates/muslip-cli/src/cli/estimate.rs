@@ -17,13 +17,13 @@ use muslip_recordings::map_file;
 use muslip_recordings::model_file::ModelFile;
 use muslip_recordings::output::{OutputError, OutputFile, write_file};
 use muslip_recordings::recording::Recording;
-use muslip_recordings::rig_file::{LARGEST_RADIUS_M, RigFile, SMALLEST_RADIUS_M};
 use muslip_report::{CurveLabel, FigureFormat, of_estimate, write_figures};
 
 use super::failure::Failure;
 use super::mapping::Mapping;
 use super::progress::Progress;
 use super::records::write_records;
+use super::rig_source::{RigOrRadius, RigSource};
 use super::terminal::Terminal;
 
 /// The name that stands for standard output.
@@ -42,12 +42,8 @@ muslip estimate --rig rig.toml --report run.html run.csv\n  \
 muslip estimate --rig rig.toml --trace trace.csv --json run.csv\n  \
 muslip estimate --rig rig.toml --model found/model.toml run.csv")]
 pub(super) struct Arguments {
-    /// Rig file (TOML).
-    #[arg(long, value_name = "RIG.toml")]
-    rig: Option<PathBuf>,
-    /// Free-rolling radius of the wheel in m, in place of a rig file: slip and friction need nothing else of it.
-    #[arg(long, value_name = "METRES", conflicts_with = "rig")]
-    radius: Option<f64>,
+    #[command(flatten)]
+    wheel: RigOrRadius,
     #[command(flatten)]
     mapping: Mapping,
     #[command(flatten)]
@@ -146,17 +142,8 @@ pub(super) fn run(arguments: &Arguments, terminal: &mut Terminal) -> Result<(), 
             "--trace - and --json both write to standard output: give --trace a file name".into(),
         ));
     }
-    let rig = match (&arguments.rig, arguments.radius) {
-        (Some(path), _) => RigSource::File(path),
-        (None, Some(radius_m)) => RigSource::Radius(radius_m),
-        (None, None) => {
-            return Err(Failure::Usage(
-                "the wheel's radius is not known: add --radius METRES (or --rig RIG.toml)".into(),
-            ));
-        }
-    };
     let job = Job {
-        rig,
+        rig: arguments.wheel.source()?,
         map: arguments.mapping.map.as_deref(),
         recording_path: &arguments.recording,
         options: arguments.choices.options(),
@@ -196,46 +183,6 @@ pub(super) fn run(arguments: &Arguments, terminal: &mut Terminal) -> Result<(), 
         terminal.line(&format!("Written: {}", path.display()))?;
     }
     Ok(())
-}
-
-/// Where the wheel's radius is from.
-#[derive(Debug, Clone, Copy)]
-pub(super) enum RigSource<'a> {
-    /// A rig file.
-    File(&'a Path),
-    /// `--radius`, in m.
-    Radius(f64),
-}
-
-impl RigSource<'_> {
-    fn path(&self) -> Option<&Path> {
-        match self {
-            Self::File(path) => Some(path),
-            Self::Radius(_) => None,
-        }
-    }
-
-    fn read(&self) -> Result<RigFile, Failure> {
-        match *self {
-            Self::File(path) => Ok(RigFile::read(path)?),
-            Self::Radius(radius_m)
-                if (SMALLEST_RADIUS_M..=LARGEST_RADIUS_M).contains(&radius_m) =>
-            {
-                Ok(RigFile::of_radius(radius_m))
-            }
-            Self::Radius(radius_m) => Err(Failure::Usage(format!(
-                "--radius {radius_m}: must be between {SMALLEST_RADIUS_M} and {LARGEST_RADIUS_M} m"
-            ))),
-        }
-    }
-
-    /// The option as it was given.
-    fn words(&self) -> String {
-        match self {
-            Self::File(path) => format!("--rig {}", path.display()),
-            Self::Radius(radius_m) => format!("--radius {radius_m}"),
-        }
-    }
 }
 
 /// An estimate with its files; the demo runs one too.

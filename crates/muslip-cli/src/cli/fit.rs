@@ -10,12 +10,12 @@ use muslip_analysis::records::of_result;
 use muslip_analysis::wording::verdict_sentence;
 use muslip_recordings::output::write_file;
 use muslip_recordings::recording::Recording;
-use muslip_recordings::rig_file::RigFile;
 
 use super::failure::Failure;
 use super::mapping::Mapping;
 use super::progress::Progress;
 use super::records::write_records;
+use super::rig_source::RigOrRadius;
 use super::terminal::Terminal;
 
 /// Fit the two-parameter law to one or several recordings at once (Levenberg-Marquardt).
@@ -24,12 +24,12 @@ use super::terminal::Terminal;
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  \
 muslip fit --rig rig.toml run.csv\n  \
+muslip fit --radius 0.31 run.mf4\n  \
 muslip fit --rig rig.toml --json run1.csv run2.csv run3.csv\n  \
 muslip fit --rig rig.toml --tir tyre.tir run.csv")]
 pub(super) struct Arguments {
-    /// Rig file (TOML).
-    #[arg(long, value_name = "RIG.toml")]
-    rig: PathBuf,
+    #[command(flatten)]
+    wheel: RigOrRadius,
     #[command(flatten)]
     mapping: Mapping,
     /// Maximum number of iterations (accepted steps).
@@ -50,8 +50,9 @@ pub(super) struct Arguments {
 }
 
 pub(super) fn run(arguments: &Arguments, terminal: &mut Terminal) -> Result<(), Failure> {
-    let rig = RigFile::read(&arguments.rig)?;
-    let map = arguments.mapping.chosen(Some(&arguments.rig))?;
+    let source = arguments.wheel.source()?;
+    let rig = source.read()?;
+    let map = arguments.mapping.chosen(source.path())?;
     let mut recordings = Vec::with_capacity(arguments.recordings.len());
     for path in &arguments.recordings {
         recordings.push(Recording::open_mapped(path, map.as_ref())?);

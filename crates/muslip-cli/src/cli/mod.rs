@@ -19,6 +19,7 @@ mod predict;
 mod progress;
 mod records;
 mod rig;
+mod rig_source;
 mod rig_view;
 mod simulate;
 mod terminal;
