@@ -93,6 +93,37 @@ fn a_ramp_is_recorded_and_the_recording_goes_straight_into_the_estimate() {
     agrees(&said, &scratch, "estimate --rig rig.toml run.csv --json");
 }
 
+#[test]
+fn a_rig_is_recorded_without_arming_it_and_its_means_are_told() {
+    let server = Server::start(Trouble::default());
+    let scratch = Scratch::with_rig(RIG);
+    let port = server.address.as_str();
+    let record = ["rig", "--port", port, "record", "--out", "rolling.csv"];
+    let said = scratch.output(&[&record[..], &["--seconds", "0.5"]].concat());
+    assert!(said.contains("500 rows, 0 samples missing"), "{said}");
+    // It rolls freely at the speed at which the simulated rig begins.
+    let mean = |name: &str| -> f64 {
+        let line = said.lines().find(|line| line.contains(name)).unwrap();
+        let mut words = line.split_whitespace();
+        words.find_map(|word| word.parse().ok()).unwrap()
+    };
+    assert!((mean("mean vehicle speed") - 20.0).abs() < 0.1, "{said}");
+    assert!(mean("slip of these").abs() < 0.005, "{said}");
+    let normal = mean("mean normal force");
+    assert!((normal / (420.0 * 9.806_65) - 1.0).abs() < 0.05, "{said}");
+    let text = scratch.read("rolling.csv");
+    let rows = text
+        .lines()
+        .filter(|line| line.starts_with(char::is_numeric));
+    // Brake demand, the last column: nothing.
+    assert!(rows.clone().all(|row| row.ends_with(",0")), "{text}");
+    assert_eq!(rows.count(), 500);
+    let status = scratch.output(&["rig", "--port", port, "status"]);
+    assert!(status.contains("Idle"), "{status}");
+    let told = scratch.complaint(&[&record[..], &["--seconds", "0"]].concat());
+    assert!(told.contains("must be positive"), "{told}");
+}
+
 /// The live estimate and that of the recording are the same but for the noise, which each learns from its own samples.
 fn agrees(said: &str, scratch: &Scratch, estimate: &str) -> f64 {
     let (_, line) = said.split_once("peak friction ").unwrap();

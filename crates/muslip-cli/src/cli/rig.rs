@@ -1,9 +1,10 @@
 //! `muslip rig`.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use clap::{Args, Subcommand};
+use muslip::sample::slip_ratio;
 use muslip_record::{
     Command, Estimating, Estimator, Event, Fault, Origin, Parameters, Profile, Program, STEPS,
     State, Status, Telemetry,
@@ -18,7 +19,7 @@ use crate::rig_link::{
     Live, Port, Recorder, RigError, Session, compensated, parse_parameters, write_parameters,
 };
 
-/// Operate a rig: arm it, run a brake profile and record it.
+/// Operate a rig: set its parameters, record it, run a brake profile.
 ///
 /// The controller releases the brake when it has heard nothing from this program for 0.25 s: killing the program
 /// stops the run. Wiring and commissioning: docs/rig.md.
@@ -29,6 +30,7 @@ muslip rig --port /dev/ttyUSB0 tare\n  \
 muslip rig --port /dev/ttyUSB0 parameters > rig-parameters.toml\n  \
 muslip rig --port /dev/ttyUSB0 parameters --set rig-parameters.toml\n  \
 muslip rig --port /dev/ttyUSB0 parameters --model found/model.toml\n  \
+muslip rig --port /dev/ttyUSB0 record --seconds 5 --out rolling.csv\n  \
 muslip rig --port /dev/ttyUSB0 run --ramp 0.5 --applications 3 --out run.csv\n  \
 muslip rig --port tcp:127.0.0.1:4500 run --slip 0.1 --hold 2 --out hold.csv")]
 pub(super) struct Arguments {
@@ -41,13 +43,14 @@ pub(super) struct Arguments {
 
 #[derive(Debug, Subcommand)]
 enum Action {
-    /// Print the controller's state, the interlocks that prevent arming and the link's counters.
+    /// Print state, fault, interlocks that prevent arming, estimator, brake energy, worst cycles, stack, last reset and the
+    /// link's counters.
     Status,
     /// Zero the load cells, with the rig at rest and the tyre lifted.
     Tare,
     /// Reset a latched fault whose cause has been removed.
     Clear,
-    /// Print the parameters, or set all of them from a file, or what the estimate compensates from a model.
+    /// Print the parameters. `--set` sets all of them from a file, `--model` only what the estimate compensates.
     Parameters {
         /// File to set them from (TOML, as printed).
         #[arg(long, value_name = "PARAMETERS.toml")]
@@ -57,8 +60,20 @@ enum Action {
         #[arg(long, value_name = "MODEL.toml")]
         model: Option<PathBuf>,
     },
+    /// Record without arming, the brake released, and print the means: for force scales, encoders, the rolling radius.
+    Record(Record),
     /// Arm, run a brake profile and record it.
     Run(Run),
+}
+
+#[derive(Debug, Args)]
+struct Record {
+    /// How long, in s; an interrupt ends it earlier and keeps the recording.
+    #[arg(long, value_name = "S", default_value_t = 10.0)]
+    seconds: f64,
+    /// File for the recording, written row by row.
+    #[arg(long, value_name = "RUN.csv")]
+    out: PathBuf,
 }
 
 #[derive(Debug, Args)]
@@ -117,6 +132,12 @@ pub(super) fn run(arguments: &Arguments, terminal: &mut Terminal) -> Result<(), 
     };
     let profile = match &arguments.action {
         Action::Run(run) => Some(profile(run)?),
+        Action::Record(record) if record.seconds.is_nan() || record.seconds <= 0.0 => {
+            return Err(Failure::Usage(format!(
+                "--seconds {}: must be positive",
+                record.seconds
+            )));
+        }
         _ => None,
     };
     let port = Port::open(&arguments.port)
@@ -166,8 +187,9 @@ pub(super) fn run(arguments: &Arguments, terminal: &mut Terminal) -> Result<(), 
                 .map_err(|error| Failure::Internal(error.to_string()))?;
             terminal.line(text.trim_end())
         }
-        Action::Run(run) => match profile {
-            Some(profile) => record(run, profile, hello.sample_rate_hz, &mut session, terminal),
+        Action::Record(what) => record(what, hello.sample_rate_hz, &mut session, terminal),
+        Action::Run(what) => match profile {
+            Some(profile) => brake(what, profile, hello.sample_rate_hz, &mut session, terminal),
             None => Ok(()),
         },
     }
@@ -352,7 +374,83 @@ fn standing(bits: u32) -> String {
     }
 }
 
+/// Longest wait for a sample, s.
+const LONGEST_WAIT: Duration = Duration::from_secs(5);
+
 fn record(
+    what: &Record,
+    sample_rate_hz: u32,
+    session: &mut Session,
+    terminal: &mut Terminal,
+) -> Result<(), Failure> {
+    let radius = f64::from(read_parameters(session)?.wheel.effective_radius_m);
+    let origin = ["recorded: muslip rig record".to_owned()];
+    let mut recorder = Recorder::create(&what.out, &origin, sample_rate_hz)?;
+    let wanted = (what.seconds * f64::from(sample_rate_hz)).ceil() as u64;
+    let (mut seen, mut view) = (Seen::default(), LiveView::new());
+    let (mut sums, mut written, mut heard) = ([0.0; 4], Ok(()), Instant::now());
+    // Samples that never came count: it lasts as long as was asked for.
+    while written.is_ok() && recorder.counts().0 + recorder.counts().1 < wanted {
+        session.listen(|message| match message {
+            Telemetry::Sample(sample) if written.is_ok() => {
+                seen.sample = Some(*sample);
+                heard = Instant::now();
+                let before = recorder.counts().0;
+                written = recorder.add(sample);
+                if recorder.counts().0 > before {
+                    let measured = [
+                        sample.wheel_speed_rad_s,
+                        sample.vehicle_speed_m_s,
+                        sample.drag_force_n,
+                        sample.normal_force_n,
+                    ];
+                    for (sum, value) in sums.iter_mut().zip(measured) {
+                        *sum += f64::from(value);
+                    }
+                }
+            }
+            Telemetry::Estimate(estimate) => seen.estimate = Some(*estimate),
+            _ => {}
+        })?;
+        view.show(&seen);
+        if heard.elapsed() > LONGEST_WAIT {
+            return Err(RigError::Silent.into());
+        }
+    }
+    written?;
+    drop(view);
+    tell_counts(&what.out, &recorder, session, terminal)?;
+    let rows = recorder.counts().0 as f64;
+    let [wheel, vehicle, drag, normal] = sums.map(|sum| sum / rows);
+    let slip = slip_ratio(wheel, vehicle, radius);
+    terminal.table(&[
+        ("mean wheel speed", format!("{wheel:.3} rad/s")),
+        ("mean vehicle speed", format!("{vehicle:.4} m/s")),
+        (
+            "slip of these",
+            slip.map_or_else(|| "none".to_owned(), |slip| format!("{slip:.4}")),
+        ),
+        ("mean drag", format!("{drag:.2} N")),
+        ("mean normal force", format!("{normal:.2} N")),
+    ])
+}
+
+/// Rows and losses of a recording.
+fn tell_counts(
+    path: &Path,
+    recorder: &Recorder,
+    session: &Session,
+    terminal: &mut Terminal,
+) -> Result<(), Failure> {
+    let (rows, missing) = recorder.counts();
+    let (lost, bad) = session.losses();
+    terminal.line(&format!(
+        "{}: {rows} rows, {missing} samples missing; {lost} frames lost, {bad} bad",
+        path.display()
+    ))
+}
+
+fn brake(
     run: &Run,
     profile: Profile,
     sample_rate_hz: u32,
@@ -395,12 +493,7 @@ fn record(
         }
     }
     drop(view);
-    let (rows, missing) = recorder.counts();
-    let (lost, bad) = session.losses();
-    terminal.line(&format!(
-        "{}: {rows} rows, {missing} samples missing; {lost} frames lost, {bad} bad",
-        run.out.display()
-    ))?;
+    tell_counts(&run.out, &recorder, session, terminal)?;
     if let Some(estimate) = seen.estimate {
         terminal.headline(&format!(
             "peak friction {:.3} ± {:.3} at slip {:.3} ± {:.3} from {} samples",
