@@ -200,7 +200,7 @@ fn check_runs(
         ),
         ("deepest stack, bytes", took("stack")?, stack),
         (
-            "sampling interrupt, worst, instructions",
+            "sampling interrupt without the sensors' reading, worst, instructions",
             took("interrupt")?,
             budget(budgets, "sampling_instructions")?,
         ),

@@ -6,9 +6,9 @@
 //! a locked wheel may be taken for standstill. Each part can be used without the others. The crate allocates nothing,
 //! does not panic and holds no `unsafe`; the same arithmetic runs in `f32` on a microcontroller and in `f64` on a host.
 //!
-//! From wheel speed alone the road must be one of the bank's and the mass known: with the mass off by up to 30 % the worst
-//! simulated dry stop did not stop within 60 s (docs/quarter-car.md, Monte Carlo). With the mass unknown, measure the vehicle's
-//! speed as well.
+//! From wheel speed alone the road must be one of the bank's and the mass known: the worst simulated stops on dry asphalt
+//! (mass off by up to 30 %) and on snow (already by up to 5 %) did not stop within 60 s (docs/quarter-car.md, Monte Carlo).
+//! With the mass unknown, measure the vehicle's speed as well.
 //!
 //! # The model on one screen
 //!
