@@ -49,7 +49,7 @@ enum Command {
         /// Only scenarios whose name contains this; budgets are then of those alone.
         #[arg(long)]
         only: Option<String>,
-        /// Write the measured figures into README.md.
+        /// Write the measured figures into README.md and docs/rig.md.
         #[arg(long)]
         write: bool,
         /// Instead of all that: the image behind a socket at this address, for `muslip rig`.

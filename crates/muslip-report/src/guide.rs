@@ -68,7 +68,7 @@ pub fn section(id: Id) -> Section {
         row("sits in", guide.kind.as_str().to_owned(), None);
         row("shows in", format!("{} {balances}", listed(&touches)), None);
         row("sign", guide.sign.as_str().to_owned(), None);
-        row("remembers", guide.memory.as_str().to_owned(), None);
+        row("memory", guide.memory.as_str().to_owned(), None);
         for alias in id.aliases() {
             row(
                 "mistaken for",
@@ -81,13 +81,13 @@ pub fn section(id: Id) -> Section {
                 Some(alias.with),
             );
         }
-        row("matters from", guide.smallest.to_owned(), None);
+        row("relevant from", guide.smallest.to_owned(), None);
         let estimator = match guide.compensation {
             Compensation::By(how) => format!("muslip estimate --model {how}"),
             Compensation::Not(why) => format!("not compensated by muslip estimate --model: {why}"),
         };
         row("estimator", estimator, None);
-        row("fresh run", guide.carried.to_owned(), None);
+        row("on a fresh run", guide.carried.to_owned(), None);
     }
     Section {
         id,
@@ -366,11 +366,11 @@ mod tests {
                 "sits in",
                 "shows in",
                 "sign",
-                "remembers",
+                "memory",
                 "mistaken for",
-                "matters from",
+                "relevant from",
                 "estimator",
-                "fresh run",
+                "on a fresh run",
             ] {
                 let rows = section.rows.iter().filter(|row| row.label == label);
                 assert!(rows.clone().count() > 0, "{label} of {}", id.as_str());

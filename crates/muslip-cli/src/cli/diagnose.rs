@@ -25,8 +25,9 @@ use super::terminal::Terminal;
 /// Find the effects in recordings that the simulation lacks: where, which mechanism, size, confidence.
 ///
 /// Writes diagnosis.json, model.toml (the repaired model, for `predict` and `estimate --model`) and
-/// report.html into a folder when the diagnosis is complete. Give several recordings of one rig: some are
-/// held out to test the repaired model. Faults in the data are listed, and the other samples are used.
+/// report.html into a folder when the diagnosis is complete. Give several recordings of one rig: names and
+/// model.toml come from all of them, and a second model, made without some, is scored on those. Faults in the data are
+/// listed, and the other samples are used.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  \
 muslip diagnose --rig rig.toml --out found run1.csv run2.csv run3.csv\n  \

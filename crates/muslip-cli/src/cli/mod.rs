@@ -36,7 +36,7 @@ use terminal::Terminal;
 /// Exit status of bad usage and bad input.
 const BAD_INPUT: u8 = 2;
 
-/// Estimate the mu-slip curve of a braked wheel from rig recordings.
+/// Estimate mu-slip curves from recordings of a braked wheel, find what a simulation lacks, operate a rig.
 #[derive(Debug, Parser)]
 #[command(name = "muslip", bin_name = "muslip", version, max_term_width = 100)]
 #[command(after_help = "Try it: muslip demo\n\

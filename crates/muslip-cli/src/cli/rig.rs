@@ -43,7 +43,7 @@ pub(super) struct Arguments {
 
 #[derive(Debug, Subcommand)]
 enum Action {
-    /// Print state, fault, interlocks that prevent arming, estimator, brake energy, worst cycles, stack, last reset and the
+    /// Print state, fault, what prevents arming, estimator, brake energy, worst cycles, stack, last reset and the
     /// link's counters.
     Status,
     /// Zero the load cells, with the rig at rest and the tyre lifted.

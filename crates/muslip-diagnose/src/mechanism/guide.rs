@@ -28,6 +28,12 @@ pub mod runs {
     pub const TRACK_AGAIN: &str = "Run the same track again, entering it ten metres later: a patch stays where it is on the track.";
     /// Two speeds.
     pub const TWO_SPEEDS: &str = "Repeat the ramp at two speeds a factor of three apart, at one load: shape follows slip, speed sensitivity follows sliding speed.";
+    /// Two loads.
+    pub const TWO_LOADS: &str = "Repeat the ramp at one speed under two loads: load sensitivity changes the peak, speed sensitivity does not.";
+    /// Ramp rates.
+    pub const RAMP_RATES: &str = "Repeat the ramp at a third and at three times the pressure rate: what comes late opens a wider loop at the faster rate, a hysteresis keeps its loop.";
+    /// Zero before and after.
+    pub const ZERO_BEFORE_AND_AFTER: &str = "Read the zero before and after the run, the wheel lifted and standing: only a drift has moved it.";
     /// First run again.
     pub const FIRST_RUN_AGAIN: &str = "Repeat the first run at the end, and read the zero with the wheel lifted before and after.";
     /// Load steps.

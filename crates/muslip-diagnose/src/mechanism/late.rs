@@ -17,7 +17,7 @@ pub const AT_ONE_SPEED: Alias = Alias {
 pub const AT_ONE_RATE: Alias = Alias {
     with: Id::SlipHysteresis,
     why: "At one rate of slip what comes late opens the same loop.",
-    run: runs::RAMP_SPEEDS,
+    run: runs::RAMP_RATES,
 };
 /// ... and a reaction to the wheel's acceleration.
 pub const AS_THE_WHEEL_SLOWS: Alias = Alias {

@@ -60,7 +60,7 @@ impl Describe for RollingResistance {
                 Alias {
                     with: Id::ZeroDrift,
                     why: "Both are a force while nothing brakes.",
-                    run: runs::ROLL_AND_DRIVE,
+                    run: runs::ZERO_BEFORE_AND_AFTER,
                 },
             ],
             smallest: "one percent of the load",

@@ -123,12 +123,12 @@ impl Describe for SpeedSensitivity {
                 Alias {
                     with: Id::LoadSensitivity,
                     why: "Where load moves with speed (pitch, downforce), either explains what the other does.",
-                    run: runs::TWO_SPEEDS,
+                    run: runs::TWO_LOADS,
                 },
                 Alias {
                     with: Id::WearDrift,
                     why: "Where later runs are faster or slower, use and speed go together.",
-                    run: runs::TWO_SPEEDS,
+                    run: runs::FIRST_RUN_AGAIN,
                 },
             ],
             smallest: "a change of friction by 5 % over the campaign's mean speed",

@@ -104,15 +104,15 @@ impl Describe for ThermalFade {
                 Alias {
                     with: Id::ZeroDrift,
                     why: "Both grow with time in a run.",
-                    run: runs::RESTS,
+                    run: runs::ZERO_BEFORE_AND_AFTER,
                 },
                 Alias {
                     with: Id::SlipHysteresis,
                     why: "The way back from a skid is hotter than the way there, so the curve opens into a loop.",
-                    run: runs::RESTS,
+                    run: "Repeat the ramp at a third and at three times the pressure rate: a faster ramp heats less and narrows the loop, a hysteresis keeps it.",
                 },
             ],
-            smallest: "a time constant that is known to 5 %: friction that changes by some percent within a run",
+            smallest: "friction that changes by three percent within a run",
             smallest_size: |_| 0.05,
             compensation: Compensation::By(
                 "follows the temperature by the measured friction power and divides friction by its factor; the estimate holds for the cold tread",

@@ -54,7 +54,7 @@ impl Describe for VehicleSpeedDelay {
                     run: "Slow down in a freely rolling wheel, then hold the speed: a delay of a speed shows only while it changes, a wrong radius always.",
                 },
             ],
-            smallest: "five milliseconds times the deceleration over the speed is the slip that it feigns",
+            smallest: "five milliseconds: the slip is off by delay times deceleration over speed",
             smallest_size: |_| 0.005,
             compensation: speed_delay::COMPENSATION,
             carried: "as it is, for the same instrument",

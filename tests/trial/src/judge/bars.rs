@@ -95,14 +95,14 @@ pub fn figures(cases: &[Case]) -> Vec<Headline> {
     let late = || cases.iter().flat_map(|case| &case.late);
     found.push(Headline::share(
         "chain.late.right",
-        "real chains, a speed 5 ms or more off the drag: told within 20 % or 2 ms",
+        "real chains, a speed 5 ms or more off the drag: found, and within 20 % or 2 ms",
         Better::Higher,
         Some(0.90),
         Share::count(late(), |late| late.right),
     ));
     found.push(Headline::share(
         "chain.late.covered",
-        "the same, of those told: truth within two of its std",
+        "the same, of all findings with a std: truth within two of it",
         Better::Higher,
         Some(0.90),
         Share::count(late().filter_map(|late| late.covered), |covered| *covered),

@@ -216,11 +216,11 @@ impl Headline {
         }
         let at_least = self.better == Better::Higher;
         let met = (self.value - bar).abs() < 1e-12 || (self.value >= bar) == at_least;
-        // Met and at least: the whole interval above; missed and at least: the whole interval below; and the reverse.
+        // A figure without an interval (a peak of memory) is sure. Met and at least: the whole interval above; missed and at least: the whole interval below; and the reverse.
         let sure = if met == at_least {
-            self.low >= bar
+            self.low.is_nan() || self.low >= bar
         } else {
-            self.high <= bar
+            self.high.is_nan() || self.high <= bar
         };
         match (met, sure) {
             (true, true) => "met",
@@ -281,6 +281,13 @@ mod tests {
         assert_eq!(share(10, 10), "met, interval spans the bar");
         assert_eq!(share(8, 10), "**missed**, interval spans the bar");
         assert_eq!(share(10, 100), "**missed**");
+        let alone = Headline {
+            value: 1.5,
+            low: f64::NAN,
+            high: f64::NAN,
+            ..Headline::share("k", "k", Better::Lower, Some(1.0), Share { hits: 0, of: 1 })
+        };
+        assert_eq!(alone.verdict(), "**missed**");
         let most = |hits| {
             Headline::share("k", "k", Better::Lower, Some(0.05), Share { hits, of: 100 }).verdict()
         };
