@@ -390,9 +390,10 @@ fn record(
     let (mut seen, mut view) = (Seen::default(), LiveView::new());
     let (mut sums, mut written, mut heard) = ([0.0; 4], Ok(()), Instant::now());
     // Samples that never came count: it lasts as long as was asked for.
-    while written.is_ok() && recorder.counts().0 + recorder.counts().1 < wanted {
+    let ended = |recorder: &Recorder| recorder.counts().0 + recorder.counts().1 >= wanted;
+    while written.is_ok() && !ended(&recorder) {
         session.listen(|message| match message {
-            Telemetry::Sample(sample) if written.is_ok() => {
+            Telemetry::Sample(sample) if written.is_ok() && !ended(&recorder) => {
                 seen.sample = Some(*sample);
                 heard = Instant::now();
                 let before = recorder.counts().0;
