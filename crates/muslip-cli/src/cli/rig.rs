@@ -132,14 +132,15 @@ pub(super) fn run(arguments: &Arguments, terminal: &mut Terminal) -> Result<(), 
     };
     let profile = match &arguments.action {
         Action::Run(run) => Some(profile(run)?),
-        Action::Record(record) if record.seconds.is_nan() || record.seconds <= 0.0 => {
-            return Err(Failure::Usage(format!(
-                "--seconds {}: must be positive",
-                record.seconds
-            )));
-        }
         _ => None,
     };
+    if let Action::Record(Record { seconds, .. }) = arguments.action
+        && (seconds.is_nan() || seconds <= 0.0)
+    {
+        return Err(Failure::Usage(format!(
+            "--seconds {seconds}: must be positive"
+        )));
+    }
     let port = Port::open(&arguments.port)
         .map_err(|error| Failure::Usage(one_line(&error.to_string())))?;
     let (mut session, hello) = Session::open(port)?;

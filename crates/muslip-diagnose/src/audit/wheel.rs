@@ -193,7 +193,7 @@ mod tests {
         }
     }
 
-    /// A torque of two sines through a pole of a time constant and later by a delay, in s: in closed form.
+    /// A torque of three sines through a pole of a time constant and later by a delay, in s: in closed form.
     fn torque(t: f64, phase: f64, (pole, late): (f64, f64)) -> f64 {
         [(1.7, 1.0, 120.0), (11.0, 2.0, 80.0), (47.0, 3.0, 60.0)]
             .iter()
