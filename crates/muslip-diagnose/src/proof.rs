@@ -7,6 +7,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use crate::campaign::Run;
+use crate::data::Data;
 use crate::mechanism::Context;
 use crate::noise::{Likelihood, NoiseSize, Whitener, loss, whiteness};
 use crate::number::finite_or_zero;
@@ -214,9 +215,16 @@ impl Repaired {
         runs.par_iter()
             .map(|run| {
                 let known = self.known(run).map(|at| self.recordings[at].holdout);
-                let before = self.predict(run, Which::Base)?.drag_force_n;
-                let after = self.predict(run, Which::Repaired)?.drag_force_n;
-                let (series, _) = prepare(&self.rig, run, &[], 0, self.context.reach_factor);
+                let mut recorded = self.prepared(run);
+                let series = recorded.series[0].clone();
+                recorded.series[0].forget_drag();
+                let later = (!self.late.is_none()).then(|| self.inputs(run, Which::Repaired));
+                let expected = |data: &Data, which: Which| {
+                    let prediction = self.predict_from(data, which, known.is_some())?;
+                    Ok(prediction.drag_force_n)
+                };
+                let before = expected(&recorded, Which::Base)?;
+                let after = expected(later.as_ref().unwrap_or(&recorded), Which::Repaired)?;
                 let whole = series.tyre.clone();
                 let block = |proof| split::blocks(series.len(), &whole, proof);
                 let kinds = match known {

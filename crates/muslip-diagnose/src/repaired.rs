@@ -360,16 +360,16 @@ impl Repaired {
         }
     }
 
-    /// The tyre model for one recording.
+    /// The tyre model for one recording: one that it was made from, or another.
     fn model_for(
         &self,
         catalogue: &Catalogue,
-        run: &Run,
         which: Which,
+        known: bool,
     ) -> Result<Model, RepairedError> {
         let model = self.tyre_model(catalogue, which)?;
         let unplaced = &self.base_unplaced;
-        if which == Which::Base || unplaced.is_empty() || self.known(run).is_some() {
+        if which == Which::Base || unplaced.is_empty() || known {
             return Ok(model);
         }
         Ok(Model {
@@ -417,18 +417,33 @@ impl Repaired {
         self.data_of(series, extra_names)
     }
 
-    /// Predicts the drag reading of a recording from its other columns.
-    ///
-    /// # Errors
-    /// [`RepairedError`] where the model cannot be run.
-    pub fn predict(&self, run: &Run, which: Which) -> Result<Prediction, RepairedError> {
+    /// What a prediction of a recording is made from: its other columns, by the repaired model at the drag's time.
+    pub(crate) fn inputs(&self, run: &Run, which: Which) -> Data {
         let mut blind = match which {
             Which::Base => run.clone(),
             Which::Repaired => self.late.corrected(run),
         };
         blind.drag_force_n = Vec::new();
-        let data = self.prepared(&blind);
-        let model = self.model_for(&data.catalogue, run, which)?;
+        self.prepared(&blind)
+    }
+
+    /// Predicts the drag reading of a recording from its other columns.
+    ///
+    /// # Errors
+    /// [`RepairedError`] where the model cannot be run.
+    pub fn predict(&self, run: &Run, which: Which) -> Result<Prediction, RepairedError> {
+        let known = self.known(run).is_some();
+        self.predict_from(&self.inputs(run, which), which, known)
+    }
+
+    /// The same from [`Self::inputs`], of a recording that the model was made from or of another.
+    pub(crate) fn predict_from(
+        &self,
+        data: &Data,
+        which: Which,
+        known: bool,
+    ) -> Result<Prediction, RepairedError> {
+        let model = self.model_for(&data.catalogue, which, known)?;
         let series = &data.series[0];
         let state = tyre(
             &data.catalogue,
@@ -440,9 +455,9 @@ impl Repaired {
         let contact = state.contact.clone().unwrap_or_else(|| state.force.clone());
         let mut force = state.force;
         if which == Which::Repaired && !self.corrections.is_empty() {
-            let levers = Levers::new(&data, &model);
+            let levers = Levers::new(data, &model);
             for correction in &self.corrections {
-                let added = correction.apply(&data, &levers, 0)?;
+                let added = correction.apply(data, &levers, 0)?;
                 for (f, a) in force.iter_mut().zip(added) {
                     *f += a;
                 }
@@ -459,7 +474,7 @@ impl Repaired {
         }
         let drag_force_sigma_n = force.iter().map(|f| self.noise.of_reading(*f)).collect();
         Ok(Prediction {
-            time_s: run.time_s.clone(),
+            time_s: series.time.clone(),
             drag_force_n: force,
             drag_force_sigma_n,
             contact_force_n: contact

@@ -107,6 +107,16 @@ impl Series {
     pub fn is_empty(&self) -> bool {
         self.time.is_empty()
     }
+    /// Forgets the drag, and what was made from it: as if the run had been recorded without.
+    pub fn forget_drag(&mut self) {
+        self.drag = Vec::new();
+        self.drag_smooth = Vec::new();
+        self.drag_sigma = 0.0;
+        self.tyre = Vec::new();
+        self.wheel_balance = Vec::new();
+        self.vehicle_balance = Vec::new();
+    }
+
     /// Stretches usable in a balance; none where it cannot be formed.
     #[must_use]
     pub fn segments(&self, balance: Balance) -> &[Range<usize>] {

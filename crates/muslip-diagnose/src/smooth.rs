@@ -5,6 +5,8 @@
 
 use core::ops::Range;
 
+use pulp::{Arch, Simd, WithSimd};
+
 /// Window half-widths tried, in samples.
 const HALF_WIDTHS: [usize; 17] = [
     1, 2, 3, 4, 6, 8, 11, 15, 20, 27, 36, 48, 64, 85, 113, 150, 200,
@@ -112,21 +114,47 @@ pub fn smooth(
     sigma: f64,
     reach_s: &[f64],
 ) -> Smoothed {
-    let n = values.len();
-    let mut out = Smoothed {
-        value: values.to_vec(),
-        rate: vec![0.0; n],
-        variance_share: vec![1.0; n],
-    };
-    for segment in segments {
-        for k in segment.clone() {
-            let local = local_fit(time, values, segment, k, sigma, reach_s[k]);
-            out.value[k] = local.value;
-            out.rate[k] = local.rate;
-            out.variance_share[k] = local.variance_share;
+    Arch::new().dispatch(Smoothing {
+        time,
+        values,
+        segments,
+        sigma,
+        reach_s,
+    })
+}
+
+/// What is smoothed, on the widest registers that there are.
+struct Smoothing<'a> {
+    time: &'a [f64],
+    values: &'a [f64],
+    segments: &'a [Range<usize>],
+    sigma: f64,
+    reach_s: &'a [f64],
+}
+
+impl WithSimd for Smoothing<'_> {
+    type Output = Smoothed;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _simd: S) -> Smoothed {
+        let n = self.values.len();
+        let mut out = Smoothed {
+            value: self.values.to_vec(),
+            rate: vec![0.0; n],
+            variance_share: vec![1.0; n],
+        };
+        for segment in self.segments {
+            let own = segment.clone();
+            let (time, values) = (&self.time[own.clone()], &self.values[own.clone()]);
+            for (place, k) in own.enumerate() {
+                let local = local_fit(time, values, place, self.sigma, self.reach_s[k]);
+                out.value[k] = local.value;
+                out.rate[k] = local.rate;
+                out.variance_share[k] = local.variance_share;
+            }
         }
+        out
     }
-    out
 }
 
 #[derive(Clone, Copy)]
@@ -136,32 +164,57 @@ struct Local {
     variance_share: f64,
 }
 
-/// Moments of the window grown outwards from sample `k`.
-#[derive(Default)]
+/// Sums that are taken side by side.
+const LANES: usize = 4;
+
+/// Moments of the window grown outwards from one sample: sums of u, u², u³, u⁴, x, u x and u² x over offsets in time and value.
 struct Moments {
-    u: [f64; 5],
-    x: [f64; 3],
-    reference: f64,
+    count: f64,
+    sums: [f64; 7],
+    time: f64,
+    value: f64,
+    /// Of an offset in time, 1/s.
+    scale: f64,
 }
 
 impl Moments {
-    fn take(&mut self, offset: f64, value: f64) {
-        let x = value - self.reference;
-        let mut power = 1.0;
-        for order in 0..5 {
-            self.u[order] += power;
-            if order < 3 {
-                self.x[order] += power * x;
+    #[inline(always)]
+    fn terms(&self, time: f64, value: f64) -> [f64; 7] {
+        let (u, x) = ((time - self.time) * self.scale, value - self.value);
+        let square = u * u;
+        [u, square, square * u, square * square, x, u * x, square * x]
+    }
+
+    #[inline(always)]
+    fn take(&mut self, time: &[f64], values: &[f64]) {
+        self.count += time.len() as f64;
+        let mut lanes = [[0.0; LANES]; 7];
+        let (times, values) = (time.chunks_exact(LANES), values.chunks_exact(LANES));
+        for (t, x) in times.remainder().iter().zip(values.remainder()) {
+            let terms = self.terms(*t, *x);
+            for (sum, term) in self.sums.iter_mut().zip(terms) {
+                *sum += term;
             }
-            power *= offset;
+        }
+        for (t, x) in times.zip(values) {
+            for lane in 0..LANES {
+                let terms = self.terms(t[lane], x[lane]);
+                for (sums, term) in lanes.iter_mut().zip(terms) {
+                    sums[lane] += term;
+                }
+            }
+        }
+        for (sum, [a, b, c, d]) in self.sums.iter_mut().zip(lanes) {
+            *sum += (a + b) + (c + d);
         }
     }
 
     /// Local quadratic (local line with fewer than five points) at offset zero.
+    #[inline(always)]
     fn solve(&self) -> Option<Local> {
-        let [n, u1, u2, u3, u4] = self.u;
-        let [x0, x1, x2] = self.x;
-        if n >= 5.0 {
+        let n = self.count;
+        let [u1, u2, u3, u4, x0, x1, x2] = self.sums;
+        let (value, rate, variance_share) = if n >= 5.0 {
             let c00 = u2 * u4 - u3 * u3;
             let c01 = u2 * u3 - u1 * u4;
             let c02 = u1 * u3 - u2 * u2;
@@ -171,78 +224,69 @@ impl Moments {
             }
             let c11 = n * u4 - u2 * u2;
             let c12 = u1 * u2 - n * u3;
-            Some(Local {
-                value: self.reference + (c00 * x0 + c01 * x1 + c02 * x2) / determinant,
-                rate: (c01 * x0 + c11 * x1 + c12 * x2) / determinant,
-                variance_share: c00 / determinant,
-            })
+            let inverse = determinant.recip();
+            (
+                (c00 * x0 + c01 * x1 + c02 * x2) * inverse,
+                (c01 * x0 + c11 * x1 + c12 * x2) * inverse,
+                c00 * inverse,
+            )
         } else {
             let determinant = n * u2 - u1 * u1;
             if determinant <= 1e-12 * n * u2 || n < 2.0 {
                 return None;
             }
-            Some(Local {
-                value: self.reference + (u2 * x0 - u1 * x1) / determinant,
-                rate: (n * x1 - u1 * x0) / determinant,
-                variance_share: u2 / determinant,
-            })
-        }
+            let inverse = determinant.recip();
+            (
+                (u2 * x0 - u1 * x1) * inverse,
+                (n * x1 - u1 * x0) * inverse,
+                u2 * inverse,
+            )
+        };
+        Some(Local {
+            value: self.value + value,
+            rate: rate * self.scale,
+            variance_share,
+        })
     }
 }
 
-fn local_fit(
-    time: &[f64],
-    values: &[f64],
-    segment: &Range<usize>,
-    k: usize,
-    sigma: f64,
-    reach_s: f64,
-) -> Local {
+/// The fit about sample `k` of one segment.
+#[inline(always)]
+fn local_fit(time: &[f64], values: &[f64], k: usize, sigma: f64, reach_s: f64) -> Local {
+    let (at, value) = (time[k], values[k]);
     let mut best = Local {
-        value: values[k],
+        value,
         rate: 0.0,
         variance_share: 1.0,
     };
+    let last = time.len() - 1;
     let mut moments = Moments {
-        reference: values[k],
-        ..Moments::default()
+        count: 1.0,
+        sums: [0.0; 7],
+        time: at,
+        value,
+        scale: 1.0 / (time[(k + 1).min(last)] - time[k.saturating_sub(1)]).max(1e-9),
     };
-    moments.take(0.0, values[k]);
-    let (mut low, mut high) = (
-        values[k] - CONFIDENCE * sigma,
-        values[k] + CONFIDENCE * sigma,
-    );
-    let mut taken = 0;
+    // How many samples before and after it lie within reach.
+    let most = HALF_WIDTHS[HALF_WIDTHS.len() - 1];
+    let first = k.saturating_sub(most);
+    let before = k - first - time[first..k].partition_point(|t| at - t > reach_s);
+    let after = time[k + 1..(k + 1 + most).min(time.len())].partition_point(|t| t - at <= reach_s);
+    let (mut low, mut high) = (value - CONFIDENCE * sigma, value + CONFIDENCE * sigma);
+    let (mut behind, mut ahead) = (0, 0);
     let mut has_rate = false;
-    let scale = 1.0
-        / (time[(k + 1).min(segment.end - 1)] - time[k.saturating_sub(1).max(segment.start)])
-            .max(1e-9);
     for half_width in HALF_WIDTHS {
-        let mut grew = false;
-        while taken < half_width {
-            taken += 1;
-            if k >= segment.start + taken {
-                let j = k - taken;
-                if time[k] - time[j] <= reach_s {
-                    moments.take((time[j] - time[k]) * scale, values[j]);
-                    grew = true;
-                }
-            }
-            if k + taken < segment.end {
-                let j = k + taken;
-                if time[j] - time[k] <= reach_s {
-                    moments.take((time[j] - time[k]) * scale, values[j]);
-                    grew = true;
-                }
-            }
-        }
-        if !grew {
+        let (to_behind, to_ahead) = (half_width.min(before), half_width.min(after));
+        if (to_behind, to_ahead) == (behind, ahead) {
             break;
         }
-        let Some(mut local) = moments.solve() else {
+        for grown in [k - to_behind..k - behind, k + 1 + ahead..k + 1 + to_ahead] {
+            moments.take(&time[grown.clone()], &values[grown]);
+        }
+        (behind, ahead) = (to_behind, to_ahead);
+        let Some(local) = moments.solve() else {
             continue;
         };
-        local.rate *= scale;
         if local.variance_share >= 1.0 {
             if !has_rate {
                 best.rate = local.rate;

@@ -42,9 +42,20 @@ enum Lag {
     Mean,
 }
 
+/// A block with what no unknown moves.
+struct Stretch {
+    block: Block,
+    /// The drag as read.
+    drag: Vec<f64>,
+    /// Load at each step from the run-up on.
+    load: Vec<f64>,
+    /// The same, averaged for the instruments.
+    smooth_load: Vec<f64>,
+}
+
 struct Law<'a> {
     runs: &'a [Recording],
-    blocks: Vec<Block>,
+    stretches: Vec<Stretch>,
     rig: &'a Rig,
     step: f64,
     scale: f64,
@@ -70,12 +81,48 @@ const SPEED_M_S: f64 = 15.0;
 const ASTRAY_S: f64 = 0.025;
 
 impl Law<'_> {
-    /// Drag by the law and drag as read, on the block's grid; inputs are means over a width in s.
-    fn series(&self, block: &Block, x: &[f64], width: f64) -> (Vec<f64>, Vec<f64>) {
+    /// Takes these stretches of runs, in steps of this width.
+    fn divided(&mut self, stretches: &[(usize, f64, f64)], step: f64) {
+        self.step = step;
+        let width = self.width();
+        let smooth = INSTRUMENT_S.max(step);
+        self.stretches = blocks(stretches, step, (0.05, 0.15), (FEWEST_BLOCKS, 12.0, 0.8))
+            .into_par_iter()
+            .map(|block| {
+                let run = &self.runs[block.run];
+                let (start, count) = self.with_run_up(&block);
+                let load = |width: f64| run.load.signal.averages(start, step, count, width);
+                Stretch {
+                    drag: (run.drag.signal).averages(block.start, step, block.count, width),
+                    load: load(width),
+                    smooth_load: load(smooth),
+                    block,
+                }
+            })
+            .collect();
+    }
+
+    /// Width over which inputs and drag are averaged, s.
+    fn width(&self) -> f64 {
+        if self.smooth { INSTRUMENT_S } else { self.step }
+    }
+
+    /// Samples of the run-up.
+    fn ahead(&self) -> usize {
+        (RUN_UP_S / self.step) as usize
+    }
+
+    /// Where a block's run-up begins, and how many steps there are from there on.
+    fn with_run_up(&self, block: &Block) -> (f64, usize) {
+        let ahead = self.ahead();
+        (block.start - ahead as f64 * self.step, block.count + ahead)
+    }
+
+    /// Drag by the law on a stretch's grid; speeds are means over a width in s, as the load given.
+    fn drag(&self, stretch: &Stretch, x: &[f64], width: f64, load: &[f64]) -> Vec<f64> {
+        let block = &stretch.block;
         let run = &self.runs[block.run];
-        let ahead = (RUN_UP_S / self.step) as usize;
-        let start = block.start - ahead as f64 * self.step;
-        let count = block.count + ahead;
+        let (start, count) = self.with_run_up(block);
         let omega = run
             .wheel
             .signal
@@ -90,7 +137,6 @@ impl Law<'_> {
                 width
             },
         );
-        let load = run.load.signal.averages(start, self.step, count, width);
         let critical = x[CRITICAL].exp();
         let law: Vec<f64> = (0..count)
             .map(|k| {
@@ -100,29 +146,35 @@ impl Law<'_> {
                 load[k] * x[PEAK] * 2.0 * u / (1.0 + u * u)
             })
             .collect();
-        let law = match self.lag {
+        let mut law = match self.lag {
             Lag::None => law,
             Lag::Pole => following(&law, self.step, |_| x[LAG]),
             Lag::Length => following(&law, self.step, |k| x[LAG] / speed[k].max(1e-3)),
             Lag::Mean => around(&law, self.step, x[LAG]),
         };
-        let own = if self.smooth { INSTRUMENT_S } else { self.step };
-        let drag = run.drag.signal.averages(start, self.step, count, own);
-        (law[ahead..].to_vec(), drag[ahead..].to_vec())
+        law.drain(..self.ahead());
+        law
+    }
+
+    /// The same of inputs averaged for the instruments.
+    fn smooth_drag(&self, stretch: &Stretch, x: &[f64]) -> Vec<f64> {
+        self.drag(
+            stretch,
+            x,
+            INSTRUMENT_S.max(self.step),
+            &stretch.smooth_load,
+        )
     }
 }
 
 impl Balance for Law<'_> {
     fn residual(&self, x: &[f64]) -> Vec<Vec<f64>> {
-        self.blocks
+        self.stretches
             .par_iter()
-            .map(|block| {
-                let width = if self.smooth { INSTRUMENT_S } else { self.step };
-                let (law, drag) = self.series(block, x, width);
-                drag.iter()
-                    .zip(&law)
-                    .map(|(d, l)| (d - l) / self.scale)
-                    .collect()
+            .map(|stretch| {
+                let law = self.drag(stretch, x, self.width(), &stretch.load);
+                let both = stretch.drag.iter().zip(&law);
+                both.map(|(d, l)| (d - l) / self.scale).collect()
             })
             .collect()
     }
@@ -131,23 +183,19 @@ impl Balance for Law<'_> {
         if self.smooth {
             return None;
         }
-        Some(
-            self.blocks
-                .par_iter()
-                .map(|block| {
-                    let (law, _) = self.series(block, x, INSTRUMENT_S.max(self.step));
-                    law.iter().map(|l| -l / self.scale).collect()
-                })
-                .collect(),
-        )
+        let instrument = |stretch: &Stretch| {
+            let law = self.smooth_drag(stretch, x);
+            law.iter().map(|l| -l / self.scale).collect()
+        };
+        Some(self.stretches.par_iter().map(instrument).collect())
     }
 
     fn own(&self, x: &[f64]) -> Vec<Vec<Vec<f64>>> {
-        self.blocks
+        self.stretches
             .par_iter()
-            .map(|block| {
-                let mut columns = powers(block.count, 2);
-                columns.push(self.series(block, x, INSTRUMENT_S).0);
+            .map(|stretch| {
+                let mut columns = powers(stretch.block.count, 2);
+                columns.push(self.smooth_drag(stretch, x));
                 columns
             })
             .collect()
@@ -264,10 +312,9 @@ pub fn law(rig: &Rig, runs: &[Recording], vehicle: Timing, moment: f64) -> Optio
             count += 1.0;
         }
     }
-    let even = |step: f64| blocks(&stretches, step, (0.05, 0.15), (FEWEST_BLOCKS, 12.0, 0.8));
     let mut balance = Law {
         runs,
-        blocks: even(step),
+        stretches: Vec::new(),
         rig,
         step,
         scale: sum / f64::max(count, 1.0),
@@ -279,15 +326,13 @@ pub fn law(rig: &Rig, runs: &[Recording], vehicle: Timing, moment: f64) -> Optio
             .map(|run| speed(rig, run, vehicle, moment))
             .collect(),
     };
-    if balance.blocks.is_empty() || !(balance.scale > 0.0) {
+    balance.divided(&stretches, COARSE_S.max(step));
+    if balance.stretches.is_empty() || !(balance.scale > 0.0) {
         return None;
     }
-    balance.step = COARSE_S.max(step);
-    balance.blocks = even(balance.step);
     let start = coarse(&balance)?;
     balance.smooth = false;
-    balance.step = step;
-    balance.blocks = even(step);
+    balance.divided(&stretches, step);
     let begun = start[WHEEL];
     let known = vehicle.std.is_finite();
     let fixed = [false, false, false, false, known, true];

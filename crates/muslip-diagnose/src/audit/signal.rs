@@ -10,6 +10,8 @@ const CURVATURE_S: f64 = 0.03;
 pub struct Signal {
     start: f64,
     step: f64,
+    /// Knots a second.
+    rate: f64,
     integral: Vec<f64>,
     /// First and last reading.
     ends: (f64, f64),
@@ -34,6 +36,7 @@ impl Signal {
         let mut out = Self {
             start: first.0,
             step,
+            rate: step.recip(),
             integral: vec![0.0],
             ends: (first.1, last.1),
         };
@@ -64,8 +67,9 @@ impl Signal {
     }
 
     /// Integral up to a time.
+    #[inline]
     fn integral_at(&self, time: f64) -> f64 {
-        let place = (time - self.start) / self.step;
+        let place = (time - self.start) * self.rate;
         let last = self.integral.len() - 1;
         if !(place > 0.0) {
             return self.ends.0 * (time - self.start);

@@ -4,11 +4,11 @@ use nalgebra::DMatrix;
 use rayon::prelude::*;
 
 use super::answer::Answer;
-use crate::campaign::Run;
 use crate::chain::correct::Lateness;
 use crate::constants::{
     LEAST_GAIN_OF_PREDICTION, LEAST_STDS_EXPORTED, LEAST_STDS_GAINED, MOST_WORSE,
 };
+use crate::data::Data;
 use crate::law::closest;
 use crate::mechanism::Stage;
 use crate::model::{Model, TYRE_BASE};
@@ -145,24 +145,31 @@ impl Answer<'_> {
     /// How the repaired model predicts the drag of the recordings beside the law fitted to raw channels: each as it is
     /// known, and as one that was never seen, whose own values are read off it anew and whose place is not known.
     pub(super) fn predicts(&self, base: &Repaired, with: &Repaired) -> Predicts {
-        let gains = |unseen: bool| {
-            let runs = self.given.runs.par_iter().enumerate();
-            let gains = runs.map(|(place, run)| {
-                let mut run = run.clone();
-                if unseen {
-                    run.name = format!("unseen {place}");
+        let runs = self.given.runs.par_iter().enumerate();
+        let gains = runs.map(|(place, run)| {
+            let mut inputs = with.inputs(run, Which::Repaired);
+            let mut plain = (base.late != with.late).then(|| base.inputs(run, Which::Repaired));
+            let mut gain = |known: bool| {
+                let place = if known { place } else { with.recordings.len() };
+                for data in [Some(&mut inputs), plain.as_mut()].into_iter().flatten() {
+                    data.series[0].index = place;
                 }
-                let [plain, repaired] = [base, with].map(|model| square_error(model, &run));
-                Some((plain? / repaired?).ln())
-            });
-            gains.collect::<Option<Vec<f64>>>().unwrap_or_default()
-        };
-        let unseen = gains(true);
+                let error = |model: &Repaired, data: &Data| {
+                    let predicted = model.predict_from(data, Which::Repaired, known);
+                    mean_square(&predicted.ok()?.drag_force_n, &run.drag_force_n)
+                };
+                let plain = error(base, plain.as_ref().unwrap_or(&inputs))?;
+                Some((plain / error(with, &inputs)?).ln())
+            };
+            Some((gain(false)?, gain(true)?))
+        });
+        let gains: Vec<(f64, f64)> = gains.collect::<Option<_>>().unwrap_or_default();
+        let (unseen, known): (Vec<f64>, Vec<f64>) = gains.into_iter().unzip();
         // Shares of the error itself: that one recording gains ten times as much as another is no reason for doubt.
         let shares: Vec<f64> = unseen.iter().map(|g| 1.0 - (-0.5 * g).exp()).collect();
         let gained = surely_gained(&unseen);
         Predicts {
-            known: gained || surely_gained(&gains(false)),
+            known: gained || surely_gained(&known),
             unseen: gained && next_gains(&shares, LEAST_STDS_EXPORTED),
         }
     }
@@ -198,12 +205,11 @@ fn next_gains(gains: &[f64], stds: f64) -> bool {
     mean > stds * std * (1.0 + 1.0 / gains.len() as f64).sqrt()
 }
 
-/// Mean square of the error of a predicted drag.
-fn square_error(model: &Repaired, run: &Run) -> Option<f64> {
-    let predicted = model.predict(run, Which::Repaired).ok()?.drag_force_n;
+/// Mean square of the error of a predicted drag; `None` without a reading.
+fn mean_square(predicted: &[f64], drag: &[f64]) -> Option<f64> {
     let errors: Vec<f64> = predicted
         .iter()
-        .zip(&run.drag_force_n)
+        .zip(drag)
         .map(|(a, b)| (a - b).powi(2))
         .filter(|e| e.is_finite())
         .collect();
