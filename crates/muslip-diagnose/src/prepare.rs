@@ -147,7 +147,7 @@ pub fn prepare(
 
     let finite = |k: usize| omega[k].is_finite() && v[k].is_finite() && load[k].is_finite();
     let continuous = stretches(finite, &breaks, 3);
-    let [omega_sigma, v_sigma] = [&omega, &v].map(|x| noise_sigma(x, typical_dt));
+    let [omega_sigma, v_sigma] = [&omega, &v].map(|x| noise_sigma(time, x, typical_dt));
     let load_sigma = difference_sigma(&load);
     // No window may average over more than a sixth of a wheel revolution on either side.
     let reach: Vec<f64> = (0..n)

@@ -58,10 +58,18 @@ const STRAIGHT: f64 = 0.02;
 /// Longest means in s by which noise with a memory is heard.
 const LONGEST_MEAN_S: f64 = 0.0125;
 
+/// By how much a sample lies off the straight line between its neighbours, twice, however uneven the time between them is.
+#[must_use]
+pub fn bend(time: &[f64], x: &[f64], k: usize) -> f64 {
+    let slope = |k: usize| (x[k + 1] - x[k]) / (time[k + 1] - time[k]);
+    ((slope(k) - slope(k - 1)) * 0.5 * (time[k + 1] - time[k - 1])).abs()
+}
+
 /// Whether many samples lie on straight lines: readings that were held or counted say the same several times, and so do
 /// lines between them.
-fn is_drawn(values: &[f64]) -> bool {
-    let bends = values.windows(3).map(|w| (w[0] - 2.0 * w[1] + w[2]).abs());
+fn is_drawn(time: &[f64], values: &[f64]) -> bool {
+    let inner = 1..values.len().saturating_sub(1);
+    let bends = inner.map(|k| bend(time, values, k));
     let mut bends: Vec<f64> = bends.filter(|b| b.is_finite()).collect();
     if bends.is_empty() {
         return false;
@@ -76,9 +84,9 @@ fn is_drawn(values: &[f64]) -> bool {
 /// held or counted, or lines between them, err alike for several samples: their noise is that of means, times the root of
 /// how many samples each is of, as far as that grows.
 #[must_use]
-pub fn noise_sigma(values: &[f64], step_s: f64) -> f64 {
+pub fn noise_sigma(time: &[f64], values: &[f64], step_s: f64) -> f64 {
     let fine = difference_sigma(values);
-    if !is_drawn(values) {
+    if !is_drawn(time, values) {
         return fine;
     }
     let of_means = |samples: usize| {
@@ -332,7 +340,7 @@ mod tests {
 
     #[test]
     fn lines_between_noisy_readings_are_as_noisy_as_the_readings_over_a_window() {
-        let (_, _, white) = noisy(0.15, |t| 60.0 + 20.0 * (3.0 * t).sin());
+        let (time, _, white) = noisy(0.15, |t| 60.0 + 20.0 * (3.0 * t).sin());
         // Every fourth reading held, and lines between these: over a window twice the std of one reading.
         let held: Vec<f64> = (0..white.len()).map(|k| white[k / 4 * 4]).collect();
         let lines: Vec<f64> = (0..white.len() - 4)
@@ -342,7 +350,10 @@ mod tests {
             })
             .collect();
         for drawn in [held, lines] {
-            let (own, fine) = (noise_sigma(&drawn, 0.002), difference_sigma(&drawn));
+            let (own, fine) = (
+                noise_sigma(&time[..drawn.len()], &drawn, 0.002),
+                difference_sigma(&drawn),
+            );
             // Means of six samples hold most of it.
             assert!(
                 (0.2..0.33).contains(&own) && own > 1.3 * fine,
@@ -350,7 +361,7 @@ mod tests {
             );
         }
         // What is neither is as before.
-        assert!((noise_sigma(&white, 0.002) - difference_sigma(&white)).abs() < 1e-15);
+        assert!((noise_sigma(&time, &white, 0.002) - difference_sigma(&white)).abs() < 1e-15);
     }
 
     #[test]
