@@ -65,7 +65,8 @@ fn within_reach(source: &Source, log_std: f64) -> f64 {
     } else {
         FARTHEST
     };
-    log_std.clamp(source.log_start - reach, source.log_start + reach)
+    let most = source.log_most.min(source.log_start + reach);
+    log_std.clamp(source.log_start - reach, most)
 }
 
 /// Slope of [`penalty`] by the log size of one part.

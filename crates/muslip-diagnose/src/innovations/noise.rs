@@ -40,6 +40,8 @@ pub struct Source {
     pub log_start: f64,
     /// The largest that the sensors alone make plausible, on the same scale.
     pub log_cap: f64,
+    /// The largest that it may be fitted to, on the same scale.
+    pub log_most: f64,
     /// Whether it is an error of the slip, which enters by the law's slope.
     pub of_slip: bool,
 }
@@ -189,6 +191,7 @@ impl Source {
             log_std: std.max(1e-12).ln(),
             log_start: std.max(1e-12).ln(),
             log_cap: f64::INFINITY,
+            log_most: f64::INFINITY,
             of_slip: false,
         }
     }

@@ -15,7 +15,8 @@ pub use columns::table_grams;
 pub use filtered::Noise;
 pub use judged::Judged;
 pub use level::whole_over_slow;
-pub use sizes::{Effort, capped, noise_stride};
+pub use sizes::{Effort, noise_stride};
+use sizes::{capped, no_less_plausible};
 pub use unseen::Unseen;
 
 use super::dependence::Dependence;
@@ -39,7 +40,7 @@ pub enum Guess<'a> {
 pub struct Beside {
     /// Its loss in nats.
     pub loss: f64,
-    /// Its noise as fitted.
+    /// Its noise as fitted, in which nothing may become less plausible.
     pub fitted: Noise,
     /// The same no larger than the sensors make plausible.
     pub at_sensors: Noise,
@@ -51,7 +52,7 @@ impl Beside {
     pub fn new(data: &Data, judged: &Judged) -> Self {
         Self {
             loss: judged.loss,
-            fitted: Noise::new(data, judged.parts.clone()),
+            fitted: Noise::new(data, no_less_plausible(&judged.parts)),
             at_sensors: Noise::new(data, capped(&judged.parts)),
         }
     }

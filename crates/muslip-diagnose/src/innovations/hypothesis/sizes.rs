@@ -46,6 +46,17 @@ pub fn capped(parts: &[BalanceParts]) -> Vec<BalanceParts> {
     all
 }
 
+/// The noise with no part free to grow beyond both what it is and what the sensors make plausible: what is added to a model
+/// is to explain what the model leaves, not to make the rest of it noise.
+#[must_use]
+pub fn no_less_plausible(parts: &[BalanceParts]) -> Vec<BalanceParts> {
+    let mut all = parts.to_vec();
+    for source in all.iter_mut().flat_map(|p| &mut p.sources) {
+        source.log_most = source.log_std.max(source.log_cap);
+    }
+    all
+}
+
 /// Sizes of the noise carried over to gains taken about another model.
 pub fn with_sizes(mut fresh: Vec<BalanceParts>, old: &[BalanceParts]) -> Vec<BalanceParts> {
     for (new, old) in fresh.iter_mut().zip(old) {
