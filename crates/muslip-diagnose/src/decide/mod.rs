@@ -61,7 +61,42 @@ impl Decision {
             again(data, &model, &self.chosen.extra, &self.chosen).map(|own| settled(data, own))
         };
         self.chosen = fewer.unwrap_or(self.chosen);
+        if self.left.is_none() {
+            self.left = self.open_without(names);
+        }
         self
+    }
+
+    /// What names that are not said would have explained: the free dependence that stands beside them in the round in which
+    /// the last of them was taken up. One that was taken up since may explain it.
+    fn open_without(&self, names: &[usize]) -> Option<Left> {
+        let of = |entry: usize| move |t: &&Trial| t.mechanism().is_some_and(|m| m.1 == entry);
+        let taken_in = |entry: usize| {
+            let tried = |round: &Vec<Trial>| round.iter().any(|t| of(entry)(&t));
+            self.rounds.iter().rposition(tried)
+        };
+        let unsaid = names.iter().filter_map(|name| taken_in(*name)).max()?;
+        let mut taken_up = 0.0;
+        for term in &self.chosen.model.terms {
+            let round = taken_in(term.entry)?;
+            if round > unsaid {
+                return None;
+            }
+            let own = self.rounds[round].iter().find(of(term.entry));
+            taken_up += own.map_or(0.0, |t| t.at_sensors.0.max(0.0));
+        }
+        let free = |t: &&Trial| t.mechanism().is_none() && stands(t);
+        let standing = self.rounds[unsaid].iter().filter(free);
+        let most = standing.max_by(|a, b| a.weight().total_cmp(&b.weight()))?;
+        let Claim::Dependence(dependence) = &most.claim else {
+            return None;
+        };
+        let gain = most.at_sensors.0;
+        Some(Left {
+            dependence: dependence.clone(),
+            gain,
+            share: gain / (gain + taken_up),
+        })
     }
 }
 

@@ -10,6 +10,7 @@ pub fn rank(data: &Data, trials: &mut [Trial]) {
     trials.sort_by(|a, b| order(a, b).then(b.gain.total_cmp(&a.gain)));
     least_claims_first(trials, Trial::weight, |t| balances(data, t));
     better_predicted_first(trials, Trial::weight, |t| t.remembers.then_some(t.predicts));
+    likelier_first(trials, Trial::weight, |t| t.predicts);
     said_as_well_first(trials, Trial::weight, |own, other| {
         let own = own.mechanism().filter(|_| stands(own));
         own.is_some_and(|(id, _)| other.says_as_well == Some(id))
@@ -59,6 +60,16 @@ fn better_predicted_first<T>(
     });
 }
 
+/// Of neighbours that work through the force, the likelier one first: what it gains less by, in softnesses, is made up for by
+/// what it predicts the drag better by.
+fn likelier_first<T>(best_first: &mut [T], gain: impl Fn(&T) -> f64, predicts: impl Fn(&T) -> f64) {
+    sort_neighbours(best_first, |own, other| {
+        let less = (gain(other) - gain(own)) / softness(gain(other));
+        let better = (predicts(own) - predicts(other)) / PREDICTED_APART;
+        better.is_finite() && better > less.max(1.0)
+    });
+}
+
 /// Balances that a trial's claim is about.
 fn balances(data: &Data, trial: &Trial) -> usize {
     match trial.claim {
@@ -94,6 +105,27 @@ fn sort_neighbours<T>(all: &mut [T], precedes: impl Fn(&T, &T) -> bool) {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn what_predicts_better_by_more_than_it_gains_less_comes_first() {
+        // Softness of 1,700 nats is 55: 25 nats less are half a softness, a prediction better by 0.57 is six.
+        let first = |mut all: Vec<(f64, f64)>| {
+            likelier_first(&mut all, |t| t.0, |t| t.1);
+            all[0].0
+        };
+        assert_eq!(first(vec![(1700.0, 0.87), (1675.0, 1.44)]) as u32, 1675);
+        assert_eq!(first(vec![(1700.0, 0.87), (1675.0, 0.95)]) as u32, 1700);
+        assert_eq!(first(vec![(1700.0, 0.87), (1000.0, 1.44)]) as u32, 1700);
+        // What does not work through the force predicts nothing of it, either way.
+        assert_eq!(
+            first(vec![(1700.0, 0.87), (1675.0, f64::INFINITY)]) as u32,
+            1700
+        );
+        assert_eq!(
+            first(vec![(1700.0, f64::INFINITY), (1675.0, 1.44)]) as u32,
+            1700
+        );
+    }
 
     #[test]
     fn of_memories_that_gain_much_the_same_the_one_that_predicts_clearly_better_comes_first() {
