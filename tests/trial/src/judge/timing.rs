@@ -155,6 +155,8 @@ pub struct LateCase {
     pub channel: String,
     /// Against the drag, s.
     pub net: f64,
+    /// Whether the recordings can show it: the speed of a vehicle that is driven hardly changes.
+    pub shown: bool,
     /// Reported value and standard deviation, and what they should be: against the channel that the entry names.
     pub reported: Option<(f64, f64, f64)>,
     pub right: bool,
@@ -189,6 +191,7 @@ pub fn late(truth: &Truth, diagnosis: &Value) -> Vec<LateCase> {
             LateCase {
                 channel: (*channel).to_owned(),
                 net,
+                shown: *channel != SPEEDS[0] || truth.rig.coasting,
                 reported: told.map(|told| (told.value, told.std, told.net)),
                 right: said.iter().any(|said| close(said.value, said.net)),
                 covered: told.map(|told| (told.value - told.net).abs() <= 2.0 * told.std),
