@@ -2,7 +2,7 @@
 //! shown. A verdict of "consistent" is only as good as this list.
 
 use crate::data::Data;
-use crate::innovations::candidates::Table;
+use crate::innovations::candidates::Candidate;
 use crate::innovations::screen::Score;
 use crate::mechanism::Id;
 use crate::number::finite_or_zero;
@@ -24,13 +24,13 @@ pub struct Seen {
     identifiable: bool,
 }
 
-/// All candidates of a table that has nothing beside the base, for a threshold in standard deviations.
+/// All candidates where nothing stands beside the base, for a threshold in standard deviations.
 #[must_use]
-pub fn seen(data: &Data, table: &Table, scores: &[Score], threshold: f64) -> Vec<Seen> {
+pub fn seen(data: &Data, candidates: &[Candidate], scores: &[Score], threshold: f64) -> Vec<Seen> {
     scores
         .iter()
         .filter_map(|score| {
-            let candidate = &table.candidates[score.candidate];
+            let candidate = &candidates[score.candidate];
             let (id, entry) = (candidate.id?, candidate.entry?);
             let mechanism = data.catalogue.get(entry);
             let Some(amplitude) = mechanism.facts().amplitude else {

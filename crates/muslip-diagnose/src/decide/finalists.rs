@@ -11,13 +11,16 @@ use crate::data::Data;
 use crate::innovations::candidates::{Candidate, Table, table};
 use crate::innovations::dependence::Dependence;
 use crate::innovations::gram::total;
-use crate::innovations::hypothesis::{Effort, Noise, judge_added, noise_stride, table_grams};
+use crate::innovations::hypothesis::{
+    Beside, Effort, Noise, judge_added, noise_stride, table_grams,
+};
 use crate::innovations::noise::Slopes;
 use crate::innovations::rows::tyre_row_of;
 use crate::innovations::screen::{Score, scores};
 use crate::looked::{self, POWER, Seen};
 use crate::mechanism::{Id, Residuals};
 use crate::model::{Model, Term};
+use crate::series::Series;
 
 /// Finalists that are judged in each round: best at the sensors' noise, and by the geometric mean of the gains at both
 /// levels, which is what trials are weighed by.
@@ -84,21 +87,21 @@ fn gain_at_start(data: &Data, candidate: &Candidate, score: &Score) -> f64 {
 /// its best start.
 fn best(
     data: &Data,
-    table: &Table,
+    candidates: &[Candidate],
     all: &[Score],
     count: usize,
     passed: &[Id],
 ) -> Vec<(usize, Score)> {
-    let at_start = |s: &Score| gain_at_start(data, &table.candidates[s.candidate], s);
+    let at_start = |s: &Score| gain_at_start(data, &candidates[s.candidate], s);
     let price = |s: &Score| {
-        PRICE_OF_PARAMETER * table.candidates[s.candidate].columns.len() as f64 + PRICE_OF_NAME
+        PRICE_OF_PARAMETER * candidates[s.candidate].columns.len() as f64 + PRICE_OF_NAME
     };
     let mut best_first: Vec<&Score> = all.iter().collect();
     best_first.sort_by(|a, b| (b.gain - price(b)).total_cmp(&(a.gain - price(a))));
     let mut out: Vec<(usize, Score)> = Vec::new();
     let mut ids: Vec<Id> = Vec::new();
     for score in best_first {
-        let candidate = &table.candidates[score.candidate];
+        let candidate = &candidates[score.candidate];
         let Some(id) = candidate.id else { continue };
         if passed.contains(&id) {
             continue;
@@ -112,12 +115,12 @@ fn best(
         }
         if out
             .iter()
-            .filter(|(c, _)| table.candidates[*c].id == candidate.id)
+            .filter(|(c, _)| candidates[*c].id == candidate.id)
             .count()
             >= 2
             || out
                 .iter()
-                .any(|(c, _)| table.candidates[*c].entry == candidate.entry)
+                .any(|(c, _)| candidates[*c].entry == candidate.entry)
         {
             continue;
         }
@@ -129,7 +132,7 @@ fn best(
         }
         let starts = all
             .iter()
-            .filter(|s| table.candidates[s.candidate].entry == candidate.entry);
+            .filter(|s| candidates[s.candidate].entry == candidate.entry);
         let best = starts
             .max_by(|a, b| at_start(a).total_cmp(&at_start(b)))
             .unwrap_or(score);
@@ -169,12 +172,80 @@ fn at_both(one: &[Score], other: &[Score]) -> Vec<Score> {
     all
 }
 
+/// Rows of a campaign from which its candidates are scored in parts: their columns, a few hundred of each row, need not
+/// stay in memory together.
+const MANY_ROWS: usize = 100_000;
+
+/// Parts of a long campaign's mechanisms, and of its free dependences.
+const PARTS: usize = 4;
+
+/// What is scored together: mechanisms and free dependences, the latter last.
+fn parts<'a>(
+    data: &Data,
+    wanted: &'a [Id],
+    free: &'a [Dependence],
+) -> Vec<(&'a [Id], &'a [Dependence])> {
+    let rows: usize = data.series.iter().map(Series::len).sum();
+    if rows <= MANY_ROWS {
+        return vec![(wanted, free)];
+    }
+    let of_wanted = wanted.chunks(wanted.len().div_ceil(PARTS).max(1));
+    let of_free = free.chunks(free.len().div_ceil(PARTS).max(1));
+    of_wanted
+        .map(|ids| (ids, &free[..0]))
+        .chain(of_free.map(|free| (&wanted[..0], free)))
+        .collect()
+}
+
+/// Candidates with their scores at the sensors' noise and at the fitted one; nothing of a level where base and chain
+/// cannot be told apart.
+#[derive(Default)]
+struct Scored {
+    candidates: Vec<Candidate>,
+    at_sensors: Vec<Score>,
+    fitted: Vec<Score>,
+}
+
+impl Scored {
+    /// Adds the candidates of a table.
+    fn add(&mut self, data: &Data, beside: &Beside, table: Table) {
+        let first = self.candidates.len();
+        let at = |noise: &Noise| {
+            let found = scores(&table, &total(&table_grams(data, noise, &table)));
+            found.into_iter().flatten().map(move |score| Score {
+                candidate: first + score.candidate,
+                ..score
+            })
+        };
+        self.at_sensors.extend(at(&beside.at_sensors));
+        self.fitted.extend(at(&beside.fitted));
+        self.candidates.extend(table.candidates);
+    }
+
+    /// At the sensors' noise, and as trials are weighed; with how many ids of each are judged.
+    fn levels(&mut self) -> Vec<(Vec<Score>, usize)> {
+        let [sensors, fitted] = [&mut self.at_sensors, &mut self.fitted].map(|all| {
+            all.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+            core::mem::take(all)
+        });
+        match (sensors.is_empty(), fitted.is_empty()) {
+            (false, false) => {
+                let both = at_both(&sensors, &fitted);
+                vec![(sensors, FINALISTS[0]), (both, FINALISTS[1])]
+            }
+            (false, true) => vec![(sensors, FINALISTS[0])],
+            (true, false) => vec![(fitted, FINALISTS[0])],
+            (true, true) => Vec::new(),
+        }
+    }
+}
+
 /// All candidates beside the model so far, scored at the sensors' noise and at the fitted one.
 pub struct Screen<'a> {
     data: &'a Data,
     free: &'a [Dependence],
     before: Before<'a>,
-    table: Table,
+    candidates: Vec<Candidate>,
     /// At the sensors' noise, and as trials are weighed; with how many ids of each are judged.
     levels: Vec<(Vec<Score>, usize)>,
 }
@@ -194,39 +265,32 @@ impl<'a> Screen<'a> {
             excluded.contains(&id) || so_far.model.terms.iter().any(entry)
         };
         let found = evidence(data, &so_far.model);
-        let table = table(
-            data,
-            &so_far.model,
-            &slopes,
-            &found,
-            &so_far.extra,
-            free,
-            // What belongs to a balance that cannot be formed is not named for another.
-            &|id| !taken(id) && data.forms(id.balance()),
-        );
-        let at = |noise: &Noise| scores(&table, &total(&table_grams(data, noise, &table)));
-        let levels: Vec<(Vec<Score>, usize)> =
-            match (at(&before.beside().at_sensors), at(&before.beside().fitted)) {
-                (Some(sensors), Some(fitted)) => {
-                    let both = at_both(&sensors, &fitted);
-                    vec![(sensors, FINALISTS[0]), (both, FINALISTS[1])]
-                }
-                (Some(one), None) | (None, Some(one)) => vec![(one, FINALISTS[0])],
-                (None, None) => Vec::new(),
-            };
+        // What belongs to a balance that cannot be formed is not named for another.
+        let wanted: Vec<Id> = Id::ALL
+            .iter()
+            .copied()
+            .filter(|id| !taken(*id) && data.forms(id.balance()))
+            .collect();
+        let mut scored = Scored::default();
+        for (ids, free) in parts(data, &wanted, free) {
+            let wanted = |id: Id| ids.contains(&id);
+            let (model, extra) = (&so_far.model, &so_far.extra);
+            let table = table(data, model, &slopes, &found, extra, free, &wanted);
+            scored.add(data, before.beside(), table);
+        }
         Self {
             data,
             free,
             before,
-            table,
-            levels,
+            levels: scored.levels(),
+            candidates: scored.candidates,
         }
     }
 
     /// How large each mechanism would have to be to be seen.
     pub fn seen(&self) -> Vec<Seen> {
         self.levels.first().map_or_else(Vec::new, |(all, _)| {
-            looked::seen(self.data, &self.table, all, detectable())
+            looked::seen(self.data, &self.candidates, all, detectable())
         })
     }
 
@@ -239,10 +303,10 @@ impl<'a> Screen<'a> {
 
     /// Mechanisms that are judged, by candidate and start: the best but those passed over.
     fn mechanisms(&self, passed: &[Id]) -> Vec<(usize, Vec<f64>)> {
-        let candidates = &self.table.candidates;
+        let candidates = &self.candidates;
         let mut out: Vec<(usize, Vec<f64>)> = Vec::new();
         for (all, count) in &self.levels {
-            for (index, score) in best(self.data, &self.table, all, *count, passed) {
+            for (index, score) in best(self.data, candidates, all, *count, passed) {
                 let candidate = &candidates[index];
                 if !out.iter().any(|f| candidates[f.0].entry == candidate.entry) {
                     out.push((index, start_of(self.data, candidate, &score)));
@@ -255,7 +319,7 @@ impl<'a> Screen<'a> {
     /// The best free dependence of either level, by candidate; where that is one for each run by itself, whose many
     /// columns follow anything, the best of the others as well.
     fn dependences(&self) -> Vec<usize> {
-        let first = self.table.candidates.len() - self.free.len();
+        let first = self.candidates.len() - self.free.len();
         let mut out: Vec<usize> = Vec::new();
         for (all, _) in &self.levels {
             let best = || all.iter().map(|s| s.candidate).filter(|own| *own >= first);
@@ -282,11 +346,11 @@ impl<'a> Screen<'a> {
     fn judged(&self, finalists: &[(usize, Vec<f64>)]) -> Vec<Trial> {
         let data = self.data;
         let so_far = self.before.judged;
-        let first_free = self.table.candidates.len() - self.free.len();
+        let first_free = self.candidates.len() - self.free.len();
         let mut trials: Vec<Trial> = finalists
             .par_iter()
             .filter_map(|(index, start)| {
-                let candidate = &self.table.candidates[*index];
+                let candidate = &self.candidates[*index];
                 let mut model = so_far.model.clone();
                 let mut extra = so_far.extra.clone();
                 let claim = match (candidate.id, candidate.entry) {
