@@ -386,13 +386,15 @@ fn coarse(balance: &Law) -> Option<Vec<f64>> {
     let prior = balance.prior();
     let step = 0.02;
     let count = ((WHEEL_RANGE_S.1 - WHEEL_RANGE_S.0) / step).round() as usize;
-    (0..=count)
+    let refined: Vec<Solution> = (0..=count)
+        .into_par_iter()
         .filter_map(|k| {
             let mut x: Vec<f64> = prior.iter().map(|p| p.0).collect();
             x[WHEEL] = WHEEL_RANGE_S.0 + k as f64 * step;
             let fixed = [false, false, true, false, true, true];
             refine(balance, &x, &[0.6], 3, &fixed)
         })
-        .min_by(|a, b| a.sum.total_cmp(&b.sum))
-        .map(|estimate| estimate.unknowns)
+        .collect();
+    let best = (refined.into_iter()).min_by(|a, b| a.sum.total_cmp(&b.sum));
+    best.map(|estimate| estimate.unknowns)
 }

@@ -2,11 +2,12 @@
 //! uncertainties from the spread over stretches.
 
 use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
 
 use super::constants::WHITENING_ORDER;
 
 /// A balance whose residual depends on a few unknowns.
-pub trait Balance {
+pub trait Balance: Sync {
     /// Residuals, one vector a stretch.
     fn residual(&self, unknowns: &[f64]) -> Vec<Vec<f64>>;
     /// Residuals from which the slopes are taken that the residuals are weighed by; where the inputs are noisy, of
@@ -322,14 +323,14 @@ const LONGEST_STEP: f64 = 40.0;
 
 /// Whitened slopes of a residual in the free unknowns.
 fn slopes(
-    residual: impl Fn(&[f64]) -> Option<Vec<Vec<f64>>>,
+    residual: impl Fn(&[f64]) -> Option<Vec<Vec<f64>>> + Sync,
     whitener: &Whitener,
     unknowns: &[f64],
     steps: &[f64],
     free: &[usize],
 ) -> Option<Vec<Vec<Vec<f64>>>> {
     let here = whitener.apply(&residual(unknowns)?);
-    free.iter()
+    free.par_iter()
         .map(|&i| {
             let mut moved = unknowns.to_vec();
             moved[i] += steps[i];

@@ -1,5 +1,7 @@
 //! The vehicle's balance in level form: v(t) against the drag's impulse, and what it says of the vehicle speed's delay.
 
+use rayon::prelude::*;
+
 use super::constants::{
     COARSE_STEP_S, FEWEST_BLOCKS, MOST_ROWS, SHORTEST_BLOCK_S, VEHICLE_RANGE_S, VEHICLE_STEP_S,
 };
@@ -139,15 +141,16 @@ pub fn vehicle(runs: &[Recording], mass: f64) -> Option<Solution> {
     }
     // Coarsely: differences, and the scale as it comes.
     let count = ((VEHICLE_RANGE_S.1 - VEHICLE_RANGE_S.0) / COARSE_STEP_S).round() as usize;
-    let best = (0..=count)
+    let scanned: Vec<(f64, f64)> = (0..=count)
+        .into_par_iter()
         .filter_map(|k| {
             let delay = VEHICLE_RANGE_S.0 + k as f64 * COARSE_STEP_S;
             let value = scan_value(&balance, &[1.0, delay, 0.0], &[0.95]);
             value.is_finite().then_some((value, delay))
         })
-        .min_by(|a, b| a.0.total_cmp(&b.0))?
-        .1;
-    let start = [1.0, best, 0.0];
+        .collect();
+    let best = scanned.iter().min_by(|a, b| a.0.total_cmp(&b.0))?;
+    let start = [1.0, best.1, 0.0];
     let at = refine(&balance, &start, &[0.95], 4, &[false, false, true])?;
     recoloured(&balance, at, &[false; 3])
 }

@@ -1,5 +1,7 @@
 //! The wheel's balance in level form: J ω(t) against the impulses of drag and brake.
 
+use rayon::prelude::*;
+
 use super::constants::{
     BRAKE_MOMENT_S2, COARSE_STEP_S, FEWEST_BLOCKS, MOST_ROWS, WHEEL_RANGE_S, WHEEL_STEP_S,
 };
@@ -159,14 +161,15 @@ pub fn wheel(rig: &Rig, runs: &[Recording], known: Timing) -> Option<Solution> {
             .map(|k| WHEEL_RANGE_S.0 + k as f64 * COARSE_STEP_S)
             .collect()
     };
-    let best = near
-        .iter()
-        .flat_map(|&wheel| BRAKES_S.map(|brake| (wheel, brake)))
+    let scanned: Vec<(f64, f64, f64)> = near
+        .par_iter()
+        .flat_map_iter(|&wheel| BRAKES_S.map(|brake| (wheel, brake)))
         .filter_map(|(wheel, brake)| {
             let value = scan_value(&balance, &[1.0, 1.0, wheel, brake, 0.0], &[0.98]);
             value.is_finite().then_some((value, wheel, brake))
         })
-        .min_by(|a, b| a.0.total_cmp(&b.0))?;
+        .collect();
+    let best = scanned.iter().min_by(|a, b| a.0.total_cmp(&b.0))?;
     let start = [1.0, 1.0, best.1, best.2, 0.0];
     let at = refine(
         &balance,
