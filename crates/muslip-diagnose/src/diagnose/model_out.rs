@@ -213,7 +213,7 @@ fn mean_square(predicted: &[f64], drag: &[f64]) -> Option<f64> {
         .map(|(a, b)| (a - b).powi(2))
         .filter(|e| e.is_finite())
         .collect();
-    Some(errors.iter().sum::<f64>() / errors.len().max(1) as f64)
+    (!errors.is_empty()).then(|| errors.iter().sum::<f64>() / errors.len() as f64)
 }
 
 #[cfg(test)]

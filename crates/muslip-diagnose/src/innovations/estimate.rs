@@ -461,6 +461,28 @@ mod tests {
     }
 
     #[test]
+    fn no_size_is_fitted_beyond_the_most_that_it_may_be() {
+        in_every_balance(6, |readings, start| {
+            let mut parts = start.clone();
+            for source in &mut parts.sources {
+                source.log_std -= 1.0;
+                source.log_most = source.log_std;
+            }
+            let most: Vec<f64> = parts.sources.iter().map(|s| s.log_most).collect();
+            let held = fit(readings, &mut parts, 60);
+            let within = parts
+                .sources
+                .iter()
+                .zip(&most)
+                .all(|(s, most)| s.log_std <= *most);
+            assert!(within, "{:?}", start.balance);
+            // Freely the loss falls further: the bound is what held it.
+            let free = fit(readings, &mut start.clone(), 60);
+            assert!(free < held - 10.0, "{free} {held}");
+        });
+    }
+
+    #[test]
     fn sizes_seven_times_too_small_or_too_large_lead_to_a_loss_within_a_nat() {
         in_every_balance(7, |readings, start| {
             let from = |by: f64| {
