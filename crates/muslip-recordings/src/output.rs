@@ -14,7 +14,8 @@ use tempfile::{NamedTempFile, TempDir};
 /// Files and folders under temporary names, of all threads.
 static HALF_WRITTEN: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
 
-/// Removes what is half written: for programs that are about to end without leaving their functions, as at an interrupt.
+/// Removes what is half written, and lets nothing more be begun: for programs that are about to end without leaving their
+/// functions, as at an interrupt.
 pub fn remove_half_written() {
     let mut all = HALF_WRITTEN.lock().unwrap_or_else(PoisonError::into_inner);
     for path in all.drain(..) {
@@ -25,6 +26,8 @@ pub fn remove_half_written() {
             fs::remove_file(&path)
         };
     }
+    // What another thread began now would stay.
+    core::mem::forget(all);
 }
 
 /// A temporary name, for as long as there is something under it.
@@ -32,10 +35,16 @@ pub fn remove_half_written() {
 struct HalfWritten(PathBuf);
 
 impl HalfWritten {
-    fn new(path: &Path) -> Self {
+    /// Makes a file or folder under a temporary name and notes that name, with no interrupt in between.
+    fn made<T>(
+        make: impl FnOnce() -> io::Result<T>,
+        path: fn(&T) -> &Path,
+    ) -> io::Result<(T, Self)> {
         let mut all = HALF_WRITTEN.lock().unwrap_or_else(PoisonError::into_inner);
-        all.push(path.to_owned());
-        Self(path.to_owned())
+        let made = make()?;
+        let path = path(&made).to_owned();
+        all.push(path.clone());
+        Ok((made, Self(path)))
     }
 }
 
@@ -111,9 +120,11 @@ impl OutputFile {
                     Some(folder) if !folder.as_os_str().is_empty() => folder,
                     _ => Path::new("."),
                 };
-                let temporary = temporary_in(folder).map_err(fail)?;
+                let (temporary, half_written) =
+                    HalfWritten::made(|| temporary_in(folder), NamedTempFile::path)
+                        .map_err(fail)?;
                 Sink::Renamed {
-                    half_written: HalfWritten::new(temporary.path()),
+                    half_written,
                     temporary: BufWriter::with_capacity(1 << 16, temporary),
                     destination,
                 }
@@ -225,13 +236,16 @@ impl StagedFolder {
     pub fn create(destination: &Path) -> Result<Self, OutputError> {
         let made = !destination.exists();
         create_folder(destination)?;
-        let stage = tempfile::Builder::new()
-            .prefix(".muslip-")
-            .tempdir_in(destination)
+        let make = || {
+            tempfile::Builder::new()
+                .prefix(".muslip-")
+                .tempdir_in(destination)
+        };
+        let (stage, half_written) = HalfWritten::made(make, TempDir::path)
             .map_err(|error| OutputError::new(destination, error))?;
         Ok(Self {
             destination: destination.to_owned(),
-            _half_written: HalfWritten::new(stage.path()),
+            _half_written: half_written,
             stage: Some(stage),
             made,
         })
@@ -312,6 +326,16 @@ mod tests {
         file.commit().unwrap();
         drop(staged);
         assert_eq!(here(), 0);
+    }
+
+    #[test]
+    fn no_interrupt_comes_between_a_temporary_file_and_the_note_of_its_name() {
+        let folder = tempfile::tempdir().unwrap();
+        let make = || {
+            assert!(HALF_WRITTEN.try_lock().is_err(), "the list is free");
+            temporary_in(folder.path())
+        };
+        HalfWritten::made(make, NamedTempFile::path).unwrap();
     }
 
     #[test]
