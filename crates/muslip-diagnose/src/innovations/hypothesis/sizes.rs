@@ -7,7 +7,7 @@ use crate::data::Data;
 use crate::innovations::candidates::Table;
 use crate::innovations::estimate::{self, Readings};
 use crate::innovations::gram::{Columns, Gram, grams, total};
-use crate::innovations::noise::BalanceParts;
+use crate::innovations::noise::{BalanceParts, Source};
 use crate::innovations::screen::precision;
 use crate::mechanism::Balance;
 
@@ -39,21 +39,23 @@ pub fn noise_stride(data: &Data) -> usize {
 /// The noise with every part at most as large as the sensors make plausible.
 #[must_use]
 pub fn capped(parts: &[BalanceParts]) -> Vec<BalanceParts> {
-    let mut all = parts.to_vec();
-    for source in all.iter_mut().flat_map(|p| &mut p.sources) {
+    changed(parts, |source| {
         source.log_std = source.log_std.min(source.log_cap);
-    }
-    all
+    })
 }
 
 /// The noise with no part free to grow beyond both what it is and what the sensors make plausible: what is added to a model
 /// is to explain what the model leaves, not to make the rest of it noise.
 #[must_use]
 pub fn no_less_plausible(parts: &[BalanceParts]) -> Vec<BalanceParts> {
-    let mut all = parts.to_vec();
-    for source in all.iter_mut().flat_map(|p| &mut p.sources) {
+    changed(parts, |source| {
         source.log_most = source.log_std.max(source.log_cap);
-    }
+    })
+}
+
+fn changed(parts: &[BalanceParts], change: impl FnMut(&mut Source)) -> Vec<BalanceParts> {
+    let mut all = parts.to_vec();
+    all.iter_mut().flat_map(|p| &mut p.sources).for_each(change);
     all
 }
 
