@@ -49,6 +49,13 @@ pub const CLEARLY_PREDICTED: f64 = 0.25;
 /// sensors' noise are uneven: to a third.
 pub const LINED_UP_PREDICTED: f64 = 1.0;
 
+/// Most names beside the chain's: a campaign of a few runs tells no more apart.
+pub const MOST_NAMES: usize = 3;
+/// Added to a threshold in standard deviations, so that four in five effects of that size are seen.
+pub const POWER: f64 = 0.84;
+/// Largest share of a parameter's range that is still a size to be found.
+pub const PLAUSIBLE_SHARE: f64 = 0.5;
+
 // What stood before.
 
 /// Least share of what spoke for a name that still has to once another was taken up.
@@ -103,6 +110,9 @@ pub const LEAST_T_OF_DEPENDENCE: f64 = 3.0;
 pub const LEAST_GAIN_OF_DEPENDENCE_AT_SENSORS: f64 = 150.0;
 /// As [`LEAST_GAIN_OF_DEPENDENCE_AT_SENSORS`]: least t of the gains' signed roots, of one that stands, too.
 pub const LEAST_T_OF_DEPENDENCE_AT_SENSORS: f64 = 2.4;
+/// Least logarithm by which a dependence lowers the mean square error of the drag, where few runs reach what it depends on and
+/// none speaks against it: no t shows that. None of 120 development campaigns that lack nothing has more than 0.37.
+pub const LINED_UP_PREDICTED_BY_DEPENDENCE: f64 = 0.5;
 /// Logarithm by which a hidden dependence lowers the mean square error of the drag at least.
 pub const LEAST_PREDICTED_BY_DEPENDENCE: f64 = 0.05;
 
@@ -121,6 +131,21 @@ pub const LEAST_MEMORY_S: f64 = 2.5e-3;
 /// Damping ratio below which a response rings longer than any filter of a chain: the least damped pole of a fourth-order
 /// Butterworth filter has 0.38.
 pub const RINGING: f64 = 0.12;
+
+// Noise, and what is known before any reading.
+
+/// Prior standard deviation of the logarithm of a noise part's size about where it starts: wide, so that a part that the data
+/// say nothing of stays plausible.
+pub const LOG_SIZE_STD: f64 = 3.0;
+/// As [`LOG_SIZE_STD`], of how far it lies beyond what the sensors make plausible: what belongs to a run or goes slowly could
+/// otherwise take up any effect at no cost.
+pub const LOG_SIZE_STD_BEYOND: f64 = 0.8;
+/// What is known of a parameter without any reading: its standard deviation as a share of its range.
+pub const UNREAD_SHARE_OF_RANGE: f64 = 0.3;
+/// Least gain of the rig file's law over no force at all, nats, where a drag says anything of friction.
+pub const LEAST_GAIN_OF_LAW: f64 = 60.0;
+/// Least share of samples that only repeat the one before in a channel that is held.
+pub const LEAST_REPEATED: f64 = 0.4;
 
 // Timing of the channels.
 
@@ -173,6 +198,10 @@ pub const AUDITED: f64 = 2.0;
 
 // The repaired model.
 
+/// Fewest usable runs of which whole ones are kept for the proof; of fewer, blocks of each.
+pub const FEWEST_RUNS_TO_KEEP: usize = 4;
+/// Usable runs for each one that is kept.
+pub const RUNS_FOR_ONE_KEPT: usize = 5;
 /// Least mean logarithm by which a repaired model lowers the square of a prediction's error: less is chance.
 pub const LEAST_GAIN_OF_PREDICTION: f64 = 0.02;
 /// Standard deviations of what the next recording gains by which the mean gain has to exceed nothing.

@@ -1,5 +1,5 @@
 //! How a dependence that no mechanism accounts for acts on the drag: by hat functions of its variable, on the friction,
-//! the force or the slip at the peak.
+//! the force, the slip at the peak or the slip that is read.
 
 use rayon::prelude::*;
 
@@ -14,8 +14,10 @@ pub enum Action {
     Friction,
     /// On the force, added, in units of the mean load.
     Force,
-    /// On the slip at the peak.
+    /// On the slip at the peak, by a factor.
     CriticalSlip,
+    /// On the slip that is read, added.
+    Slip,
 }
 
 impl Action {
@@ -26,12 +28,13 @@ impl Action {
             Self::Friction => "friction",
             Self::Force => "force",
             Self::CriticalSlip => "critical_slip",
+            Self::Slip => "slip",
         }
     }
     /// Inverse of `as_str`.
     #[must_use]
     pub fn parse(word: &str) -> Option<Self> {
-        [Self::Friction, Self::Force, Self::CriticalSlip]
+        [Self::Friction, Self::Force, Self::CriticalSlip, Self::Slip]
             .into_iter()
             .find(|a| a.as_str() == word)
     }
@@ -86,12 +89,14 @@ pub fn knots_among(mut all: Vec<f64>, count: usize) -> Vec<f64> {
     if knots.len() < 2 { Vec::new() } else { knots }
 }
 
-/// The current tyre model's force and what a relative change of the slip at the peak does to it.
+/// The current tyre model's force and what changes of the slip at the peak and of the slip that is read do to it.
 pub struct Levers {
     /// Predicted contact force in N, by run.
     pub force: Column,
     /// Change of force per relative change of the slip at the peak, in N, by run.
     pub critical: Column,
+    /// Change of force per slip that is read too little, in N, by run.
+    pub slip: Column,
 }
 
 impl Levers {
@@ -102,17 +107,33 @@ impl Levers {
         let of_run = |series: &Series| {
             let state = tyre(&data.catalogue, model, &p, series, &data.context);
             let critical = state.law.critical;
-            let slope = |k: usize| {
-                let x = state.slip[k] / critical;
-                let h = 1e-4;
-                let slope = (state.law.friction(x + h) - state.law.friction(x - h)) / (2.0 * h);
-                -slope * x * state.load[k]
-            };
-            let critical: Vec<f64> = (0..state.slip.len()).map(slope).collect();
-            (state.contact.unwrap_or(state.force), critical)
+            let slip: Vec<f64> = (0..state.slip.len())
+                .map(|k| {
+                    let x = state.slip[k] / critical;
+                    let h = 1e-4;
+                    let slope = (state.law.friction(x + h) - state.law.friction(x - h)) / (2.0 * h);
+                    slope * state.load[k] / critical
+                })
+                .collect();
+            let by_critical = slip
+                .iter()
+                .zip(&state.slip)
+                .map(|(by_slip, slip)| -by_slip * slip);
+            let force = state.contact.clone().unwrap_or_else(|| state.force.clone());
+            [force, by_critical.collect(), slip]
         };
-        let (force, critical) = data.series.par_iter().map(of_run).unzip();
-        Self { force, critical }
+        let mut levers = Self {
+            force: Vec::new(),
+            critical: Vec::new(),
+            slip: Vec::new(),
+        };
+        let by_run: Vec<[Vec<f64>; 3]> = data.series.par_iter().map(of_run).collect();
+        for [force, critical, slip] in by_run {
+            levers.force.push(force);
+            levers.critical.push(critical);
+            levers.slip.push(slip);
+        }
+        levers
     }
 
     /// The lever of an action.
@@ -122,6 +143,7 @@ impl Levers {
             Action::Friction => self.force[run][k],
             Action::Force => data.context.mean_load,
             Action::CriticalSlip => self.critical[run][k],
+            Action::Slip => self.slip[run][k],
         }
     }
 }
@@ -129,6 +151,25 @@ impl Levers {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::innovations::toy::{CRITICAL, Noise, PEAK, stop};
+
+    #[test]
+    fn levers_are_what_the_force_changes_by() {
+        let data = stop(Noise::NONE, 4);
+        let levers = |peak, critical| Levers::new(&data, &Model::of_law(peak, critical));
+        let (here, h) = (levers(PEAK, CRITICAL), 1e-5);
+        let largest = |of: &[f64]| of.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
+        let longer = levers(PEAK, CRITICAL * (1.0 + h));
+        let series = &data.series[0];
+        for k in 0..series.len() {
+            let changed = (longer.force[0][k] - here.force[0][k]) / h;
+            assert!((changed - here.critical[0][k]).abs() < 1e-3 * largest(&here.critical[0]));
+            // As much more slip leaves as much less of a longer curve.
+            let slip = series.slip(k, data.context.radius);
+            assert!((here.critical[0][k] + slip * here.slip[0][k]).abs() < 1e-6);
+        }
+        assert!(largest(&here.critical[0]) > 0.1 * largest(&here.force[0]));
+    }
 
     #[test]
     fn hats_are_a_partition_of_unity_and_constant_outside() {

@@ -7,6 +7,7 @@ use rayon::prelude::*;
 use crate::audit::colour::Colour;
 use crate::campaign::{Rig, Run};
 use crate::chain::correct::TimingStd;
+use crate::constants::LEAST_GAIN_OF_LAW;
 use crate::innovations::blocks::Blocks;
 use crate::mechanism::{Balance, Before, Context, Id, Mechanism, catalogue};
 use crate::number::{Dual, Number};
@@ -138,8 +139,6 @@ fn slip_noise_share(series: &[Series], context: &Context) -> f64 {
     if total > 0.0 { slip / total } else { 0.0 }
 }
 
-/// Least gain in nats of a law over no force at all, where a drag says anything of friction.
-const LEAST_OF_FRICTION: f64 = 60.0;
 /// Smallest noise of a drag, as a share of its root mean square.
 const LEAST_NOISE: f64 = 1e-3;
 
@@ -150,7 +149,7 @@ fn speaks_of_friction(series: &[Series], context: &Context) -> bool {
         LawProducts::of(series, context.radius, context.nominal[1]);
     let least = LEAST_NOISE.powi(2) * yy / count;
     let noise = context.drag_sigma.powi(2).max(least);
-    xy > 0.0 && xy * xy / xx > 2.0 * LEAST_OF_FRICTION * noise
+    xy > 0.0 && xy * xy / xx > 2.0 * LEAST_GAIN_OF_LAW * noise
 }
 
 /// Takes the tyre balance from a run, and says why.

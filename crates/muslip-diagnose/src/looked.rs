@@ -1,17 +1,13 @@
 //! What was looked for: whether the recordings could have shown a mechanism, and the smallest that they would have
 //! shown. A verdict of "consistent" is only as good as this list.
 
+use crate::constants::PLAUSIBLE_SHARE;
 use crate::data::Data;
 use crate::innovations::candidates::Candidate;
 use crate::innovations::screen::Score;
 use crate::mechanism::Id;
 use crate::number::finite_or_zero;
 use crate::outcome::{LookedFor, MinimumDetectable};
-
-/// Added to a threshold in standard deviations, so that four in five effects of that size are seen.
-pub const POWER: f64 = 0.84;
-/// Largest share of a parameter's range that is still a size to be found.
-const PLAUSIBLE: f64 = 0.5;
 
 /// A mechanism at one start: how large its effect is in the innovations, beside base and nuisances.
 #[derive(Clone, Debug)]
@@ -53,7 +49,7 @@ pub fn seen(data: &Data, candidates: &[Candidate], scores: &[Score], threshold: 
             let value = threshold * std;
             Some(Seen {
                 id,
-                identifiable: value < PLAUSIBLE * (described.high - described.low),
+                identifiable: value < PLAUSIBLE_SHARE * (described.high - described.low),
                 least: value.is_finite().then(|| MinimumDetectable {
                     name: described.name,
                     value: finite_or_zero(value),

@@ -5,6 +5,7 @@
 
 use core::ops::Range;
 
+use crate::constants::{FEWEST_RUNS_TO_KEEP, RUNS_FOR_ONE_KEPT};
 use crate::data::Data;
 use crate::series::Series;
 use crate::smooth::median_in_place;
@@ -18,9 +19,6 @@ pub struct Split {
     pub by_block: bool,
 }
 
-/// Fewest usable runs of which whole ones are kept, and the share of them that is.
-const LEAST_RUNS: usize = 4;
-const RUNS_FOR_ONE: usize = 5;
 /// Blocks that a run is cut into, and those of them kept for the proof, where there are too few runs.
 const BLOCKS: usize = 10;
 const KEPT_BLOCKS: [usize; 2] = [3, 7];
@@ -51,14 +49,18 @@ impl Split {
                 s.tyre_count() + s.wheel_balance.len() + s.vehicle_balance.len() > 0
             })
             .collect();
-        if usable.len() < LEAST_RUNS {
+        if usable.len() < FEWEST_RUNS_TO_KEEP {
             return Self {
                 proof_runs: Vec::new(),
                 by_block: true,
             };
         }
         Self {
-            proof_runs: typical(&data.series, &usable, (usable.len() / RUNS_FOR_ONE).max(1)),
+            proof_runs: typical(
+                &data.series,
+                &usable,
+                (usable.len() / RUNS_FOR_ONE_KEPT).max(1),
+            ),
             by_block: false,
         }
     }

@@ -39,6 +39,11 @@ pub struct Section {
     pub rows: Vec<Row>,
 }
 
+/// Label of an equation.
+const EQUATION: &str = "equation";
+/// Label of one that the recordings must not ask for.
+const RIVAL: &str = "not where this says clearly more";
+
 /// The guide's section of a mechanism.
 #[must_use]
 pub fn section(id: Id) -> Section {
@@ -46,14 +51,16 @@ pub fn section(id: Id) -> Section {
     let mut row = |label, text: String, about| rows.push(Row { label, text, about });
     row("left out", id.what().to_owned(), None);
     let entries = id.entries();
-    let mut equations: Vec<&str> = Vec::new();
-    for entry in &entries {
-        if !equations.contains(&entry.equation()) {
-            equations.push(entry.equation());
+    for (label, rival) in [(EQUATION, false), (RIVAL, true)] {
+        let mut equations: Vec<&str> = Vec::new();
+        for entry in entries.iter().filter(|e| e.facts().rival == rival) {
+            if !equations.contains(&entry.equation()) {
+                equations.push(entry.equation());
+            }
         }
-    }
-    for equation in equations {
-        row("equation", equation.to_owned(), None);
+        for equation in equations {
+            row(label, equation.to_owned(), None);
+        }
     }
     let mut physics = "";
     if let Some(guide) = id.guide() {
@@ -178,7 +185,7 @@ pub fn markdown() -> String {
         );
         for row in section.rows {
             let text = match (row.label, row.about) {
-                ("equation", _) => format!("`{}`", row.text),
+                (EQUATION | RIVAL, _) => format!("`{}`", row.text),
                 (_, Some(about)) => {
                     let said = spoken(about.as_str());
                     let rest = row.text.strip_prefix(&said).unwrap_or(&row.text);

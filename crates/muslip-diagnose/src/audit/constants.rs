@@ -126,3 +126,12 @@ pub const OWN_LAG_S: f64 = 0.8;
 pub const LASTING_SHARE: f64 = 0.7;
 /// Lag at which blocks are seen to move, s: noise has many such in a block.
 pub const MEMORY_MOTION_S: f64 = 0.02;
+/// Least share of the square of what is rough in the drag that a hum makes, for it to be said to be left unexplained. Hums of
+/// measuring chains on 120 development campaigns made up to 0.21; of as much as all noise of the tyre's balance, 0.29.
+pub const HUM_BEYOND_NOISE: f64 = 0.25;
+/// Share of a drag's zero by which law and wheel's balance may tell it differently.
+pub const ZERO_SHARE: f64 = 0.25;
+/// Fewest standard deviations of a zero that only the law tells.
+pub const ZERO_ALONE_SIGMAS: f64 = 5.0;
+/// Factor on what the law's zero is said to be uncertain by: the law's form is only nearly a tyre's.
+pub const ZERO_LAW_FACTOR: f64 = 2.0;

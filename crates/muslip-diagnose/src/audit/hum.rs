@@ -193,10 +193,18 @@ fn turns(windows: &[Window], hz: f64, by_clock: f64) -> bool {
     })
 }
 
-/// Mains hum in the drag: amplitude in N, and its frequency in words, where there is a line that the wheel's turning does
-/// not make.
+/// Hum in the drag.
+#[derive(Clone, Debug)]
+pub struct Hum {
+    /// Its amplitude in N, and its frequency in words.
+    pub finding: Finding,
+    /// Its share of the square of what is rough in the drag: the rest is noise.
+    pub share: f64,
+}
+
+/// Mains hum in the drag, where there is a line that the wheel's turning does not make.
 #[must_use]
-pub fn hum(runs: &[Recording]) -> Option<Finding> {
+pub fn hum(runs: &[Recording]) -> Option<Hum> {
     let (windows, length) = windows(runs);
     let near = line(&windows, length)? as f64 / length;
     let at = |hz: f64| -> Vec<f64> {
@@ -225,11 +233,13 @@ pub fn hum(runs: &[Recording]) -> Option<Finding> {
         return None;
     }
     let std = (spread / count).sqrt().max(0.02 * value);
-    Some(
-        Finding::of("drag_force_n", Word::Hum, (value, std), "N").saying(format!(
-            "The drag channel hums at {hz:.2} Hz with an amplitude of {value:.3} N."
-        )),
-    )
+    let finding = Finding::of("drag_force_n", Word::Hum, (value, std), "N").saying(format!(
+        "The drag channel hums at {hz:.2} Hz with an amplitude of {value:.3} N."
+    ));
+    let squares = |w: &Window| w.rough.iter().map(|x| x * x).sum::<f64>() / w.rough.len() as f64;
+    // A line's power is a quarter of its squared amplitude, its mean square a half.
+    let share = 2.0 * by_clock.iter().sum::<f64>() / windows.iter().map(squares).sum::<f64>();
+    Some(Hum { finding, share })
 }
 
 #[cfg(test)]
@@ -264,9 +274,12 @@ mod tests {
 
     #[test]
     fn a_line_of_the_clock_is_hum_and_one_of_the_wheel_is_not() {
-        let found = hum(&runs(30.0, |t, _| core::f64::consts::TAU * 49.97 * t)).unwrap();
-        assert!((found.value / 30.0 - 1.0).abs() < 0.1, "{found:?}");
-        assert!(found.statement.contains("49.9"), "{}", found.statement);
+        let Hum { finding, share } =
+            hum(&runs(30.0, |t, _| core::f64::consts::TAU * 49.97 * t)).unwrap();
+        assert!((finding.value / 30.0 - 1.0).abs() < 0.1, "{finding:?}");
+        assert!(finding.statement.contains("49.9"), "{}", finding.statement);
+        // Noise that is even between -30 N and 30 N, a hum of 30 N: 450 of 300 and 450 square newtons.
+        assert!((share - 0.6).abs() < 0.03, "{share}");
         assert!(hum(&runs(30.0, |_, angle| 3.0 * angle)).is_none());
         assert!(hum(&runs(0.0, |_, _| 0.0)).is_none());
     }

@@ -46,6 +46,7 @@ use rayon::prelude::*;
 
 use crate::campaign::{Rig, Run};
 use colour::Colour;
+use constants::HUM_BEYOND_NOISE;
 use recording::{Recording, recording};
 use timing::{Timings, timings};
 
@@ -62,6 +63,8 @@ pub struct Audit {
     pub timings: Timings,
     /// Slow noise of the vehicle speed.
     pub vehicle_colour: Option<Colour>,
+    /// A hum of the drag that stands out of its noise.
+    pub loud_hum: Option<hum::Hum>,
     /// What the channels themselves show.
     pub findings: Vec<Finding>,
     /// What the reading of the recordings says of them.
@@ -183,7 +186,8 @@ pub fn audit(rig: &Rig, runs: &[Run]) -> Audit {
         .map_or("", |(name, _)| name);
     let mut findings = timing::findings(&timings, brake);
     findings.extend(simple::simple(runs, &recordings));
-    findings.extend(hum::hum(&recordings));
+    let hum = hum::hum(&recordings);
+    findings.extend(hum.iter().map(|hum| hum.finding.clone()));
     findings.extend(leak::leaks(runs));
     findings.extend(filter::filters(&timings, &recordings));
     let (of_speeds, vehicle_colour) = of_speeds(rig, &timings, &recordings);
@@ -195,6 +199,7 @@ pub fn audit(rig: &Rig, runs: &[Run]) -> Audit {
         vehicle_late: timings.vehicle,
         brake_late: timings.brake,
         vehicle_colour,
+        loud_hum: hum.filter(|hum| hum.share > HUM_BEYOND_NOISE),
         findings,
         resampled: resampled::findings(runs),
         timings,

@@ -1,6 +1,6 @@
 //! What the drag channel reads while nothing moves: its zero.
 
-use super::constants::TOLD_SIGMAS;
+use super::constants::{TOLD_SIGMAS, ZERO_ALONE_SIGMAS, ZERO_LAW_FACTOR, ZERO_SHARE};
 use super::finding::{Finding, Word};
 use super::recording::Recording;
 use super::tyre::{Fitted, Stretch};
@@ -57,13 +57,6 @@ pub fn zero(runs: &[Recording]) -> Option<Finding> {
     })
 }
 
-/// Share of a zero by which law and balance may tell it differently.
-const ZERO_SHARE: f64 = 0.25;
-/// Fewest standard deviations of a zero that only the law tells.
-const ALONE_SIGMAS: f64 = 5.0;
-/// Factor on what the law's zero is said to be uncertain by: the law's form is only nearly a tyre's.
-const LAW_FACTOR: f64 = 2.0;
-
 /// Mean of what the drag leaves beside the wheel's balance, the brake's share taken out, with its standard deviation.
 fn intercept(left: &[Stretch]) -> Option<(f64, f64)> {
     if left.is_empty() || left.iter().any(|s| s.wheel.is_empty()) {
@@ -91,7 +84,7 @@ fn intercept(left: &[Stretch]) -> Option<(f64, f64)> {
 /// The drag channel's zero without a standstill: the law's symmetry and the wheel's balance have to tell the same one.
 #[must_use]
 pub fn zero_of_law(fitted: &Fitted, left: &[Stretch]) -> Option<Finding> {
-    let (law, law_std) = (fitted.unknowns[3], LAW_FACTOR * fitted.std[3]);
+    let (law, law_std) = (fitted.unknowns[3], ZERO_LAW_FACTOR * fitted.std[3]);
     let (value, std) = if let Some((wheel, wheel_std)) = intercept(left) {
         let agree = (law - wheel).abs() < ZERO_SHARE * law.abs().max(wheel.abs());
         let (a, b) = (law_std.powi(-2), wheel_std.powi(-2));
@@ -103,7 +96,7 @@ pub fn zero_of_law(fitted: &Fitted, left: &[Stretch]) -> Option<Finding> {
             (a * law + b * wheel) / (a + b),
             (a + b).powf(-0.5).max(0.5 * (law - wheel).abs()),
         )
-    } else if law.abs() > ALONE_SIGMAS * law_std {
+    } else if law.abs() > ZERO_ALONE_SIGMAS * law_std {
         (law, law_std)
     } else {
         return None;

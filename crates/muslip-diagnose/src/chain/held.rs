@@ -1,9 +1,7 @@
 //! Channels that hold their last reading, drawn as straight lines between the readings.
 
 use crate::campaign::Run;
-
-/// Least share of samples that only repeat the one before in a channel that is held.
-const REPEATED: f64 = 0.4;
+use crate::constants::LEAST_REPEATED;
 
 /// A held channel with every reading at the middle of the time for which it stands, and straight lines in between:
 /// as late on average as the staircase, without its steps. Any other channel as it is.
@@ -30,7 +28,7 @@ fn unheld(time: &[f64], x: &[f64]) -> Vec<f64> {
         repeated += (stand.1 - stand.0 - 1) as f64;
         moving += (stand.1 - stand.0) as f64;
     }
-    if !(repeated > REPEATED * moving) || stands.len() < 20 {
+    if !(repeated > LEAST_REPEATED * moving) || stands.len() < 20 {
         return x.to_vec();
     }
     let middle = |(a, b): (usize, usize)| 0.5 * (time[a] + time[b - 1]);

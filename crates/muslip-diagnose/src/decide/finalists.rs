@@ -6,7 +6,7 @@ use rayon::prelude::*;
 
 use super::rank::rank;
 use super::trial::{Before, Claim, Trial};
-use crate::constants::{LEAST_GAIN, PRICE_OF_NAME, PRICE_OF_PARAMETER};
+use crate::constants::{LEAST_GAIN, POWER, PRICE_OF_NAME, PRICE_OF_PARAMETER};
 use crate::data::Data;
 use crate::innovations::candidates::{Candidate, Table, table};
 use crate::innovations::dependence::Dependence;
@@ -17,7 +17,7 @@ use crate::innovations::hypothesis::{
 use crate::innovations::noise::Slopes;
 use crate::innovations::rows::tyre_row_of;
 use crate::innovations::screen::{Score, scores};
-use crate::looked::{self, POWER, Seen};
+use crate::looked::{self, Seen};
 use crate::mechanism::{Id, Residuals};
 use crate::model::{Model, Term};
 use crate::series::Series;

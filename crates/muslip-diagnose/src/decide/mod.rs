@@ -11,16 +11,15 @@ use trial::{Before, left_open, needed};
 pub use trial::{Claim, Trial, could_stand, stands};
 
 use crate::chain::timing::Untold;
-use crate::constants::{ALIKE_NATS, DEPENDENCE_NATS, DEPENDENCE_SHARE, FORM_LEFT, STILL_SPEAKS};
+use crate::constants::{
+    ALIKE_NATS, DEPENDENCE_NATS, DEPENDENCE_SHARE, FORM_LEFT, MOST_NAMES, STILL_SPEAKS,
+};
 use crate::data::Data;
 use crate::innovations::dependence::{self, Dependence};
 use crate::innovations::hypothesis::{Guess, Judged, judge, judge_added};
 use crate::looked::Seen;
 use crate::mechanism::{Balance, Id};
 use crate::model::Model;
-
-/// Most names.
-const MOST_NAMES: usize = 3;
 
 /// How often the noise of a model is fitted anew before others are tried beside it.
 const MOST_SETTLING: usize = 5;
@@ -217,6 +216,7 @@ impl Question<'_> {
         let before = Before::new(data, so_far, self.untold, taken_up.at_sensors);
         let screen = Screen::new(data, before, &self.free, self.excluded);
         let mut trials = screen.trials();
+        refute_by_rivals(data, &mut trials);
         self.hold_beside_chain(&[], &mut trials, taken_up);
         // What only the chain remembers has taken the place of other names.
         let of_chain = trials.iter().any(|t| !t.outlasts_chain);
@@ -269,6 +269,25 @@ impl Question<'_> {
                 trial.beside_chain = stands_beside(data, trial, &before);
             }
         }
+    }
+}
+
+/// Takes names from trials that a rival form clearly outweighs: what there is of it is something else.
+fn refute_by_rivals(data: &Data, trials: &mut [Trial]) {
+    let rival = |t: &Trial| {
+        let (id, entry) = t.mechanism()?;
+        let is_rival = data.catalogue.get(entry).facts().rival;
+        is_rival.then(|| (id, t.weight()))
+    };
+    let rivals: Vec<(Id, f64)> = trials.iter().filter_map(rival).collect();
+    for trial in trials {
+        let refuted = trial.mechanism().is_some_and(|(id, _)| {
+            let own = trial.weight();
+            let outweighs =
+                |&(other, weight): &(Id, f64)| other == id && weight - own > softness(weight);
+            rivals.iter().any(outweighs)
+        });
+        trial.own &= !refuted;
     }
 }
 
@@ -452,6 +471,49 @@ mod tests {
             unanimous: [false, false],
             judged: base.clone().without_columns(),
         }
+    }
+
+    #[test]
+    fn a_dependence_that_few_runs_reach_is_left_open_where_none_speaks_against_it() {
+        let data = stop(Noise::TYPICAL, 4);
+        let base = toy::settled(&data);
+        let free = dependence::all(&data).swap_remove(0);
+        let is_open = |nats, predicts, against: bool| {
+            left_open(&Trial {
+                claim: Claim::Dependence(free.clone()),
+                gain: -5.0,
+                at_sensors: (nats, 1.0),
+                predicts,
+                unanimous: [false, !against],
+                ..of_name(&data, &base, Id::LoadSensitivity, nats, 0.5)
+            })
+        };
+        assert!(is_open(200.0, 0.6, false));
+        assert!(!is_open(200.0, 0.6, true));
+        assert!(!is_open(200.0, 0.4, false) && !is_open(100.0, 0.6, false));
+    }
+
+    #[test]
+    fn a_name_is_refuted_by_its_rival_form_where_that_says_clearly_more() {
+        let data = stop(Noise::TYPICAL, 4);
+        let base = toy::settled(&data);
+        let entries = data.catalogue.entries();
+        let rival = entries.iter().position(|m| m.facts().rival).unwrap();
+        let stays = |of_rival: f64, named: Id| {
+            let mut trials = [
+                of_name(&data, &base, named, 100.0, 3.0),
+                Trial {
+                    claim: Claim::Mechanism(entries[rival].id(), rival),
+                    ..of_name(&data, &base, Id::SlipHysteresis, of_rival, 3.0)
+                },
+            ];
+            refute_by_rivals(&data, &mut trials);
+            trials[0].own
+        };
+        // Softness of 110 nats is 7.3.
+        assert!(!stays(110.0, Id::SlipHysteresis));
+        assert!(stays(106.0, Id::SlipHysteresis));
+        assert!(stays(900.0, Id::LoadSensitivity));
     }
 
     #[test]

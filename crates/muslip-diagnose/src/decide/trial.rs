@@ -7,7 +7,8 @@ use crate::constants::{
     LEAST_PREDICTED, LEAST_PREDICTED_BY_DEPENDENCE, LEAST_T, LEAST_T_AT_SENSORS,
     LEAST_T_AT_SENSORS_NOT_FED, LEAST_T_NOT_FED, LEAST_T_OF_DEPENDENCE,
     LEAST_T_OF_DEPENDENCE_AT_SENSORS, LEAST_T_OF_LARGE, LEAST_T_OF_LIKELIER, LINED_UP_PREDICTED,
-    MOST_AGAINST, PRICE_OF_NAME, PRICE_OF_PARAMETER, REAL_MEMORY_PREDICTED, REAL_MEMORY_T,
+    LINED_UP_PREDICTED_BY_DEPENDENCE, MOST_AGAINST, PRICE_OF_NAME, PRICE_OF_PARAMETER,
+    REAL_MEMORY_PREDICTED, REAL_MEMORY_T,
 };
 use crate::data::Data;
 use crate::innovations::dependence::Dependence;
@@ -256,7 +257,10 @@ impl<'a> Before<'a> {
             let term = judged.model.terms.iter().find(|t| t.entry == entry)?;
             Some((id, entry, term.parameters.as_slice()))
         });
-        let own = term.is_none_or(|(_, entry, p)| data.catalogue.get(entry).owns(p, &data.context));
+        let own = term.is_none_or(|(_, entry, p)| {
+            let mechanism = data.catalogue.get(entry);
+            mechanism.owns(p, &data.context) && !mechanism.facts().rival
+        });
         let real = in_force && predicts > REAL_MEMORY_PREDICTED && at_sensors.1 > REAL_MEMORY_T;
         let memory_s = term.and_then(|(id, entry, p)| {
             let memory_s = data.catalogue.get(entry).memory_s(p, &data.context)?;
@@ -417,7 +421,9 @@ fn seen_at_sensors(trial: &Trial) -> bool {
 /// Whether unseen runs gain by a free dependence at the sensors' noise.
 fn dependence_at_sensors(trial: &Trial) -> bool {
     let (sum, t) = trial.at_sensors;
-    sum > LEAST_GAIN_OF_DEPENDENCE_AT_SENSORS && t > LEAST_T_OF_DEPENDENCE_AT_SENSORS
+    let lined_up =
+        trial.unanimous[1] && lowers_drag_s_error(trial.predicts, LINED_UP_PREDICTED_BY_DEPENDENCE);
+    sum > LEAST_GAIN_OF_DEPENDENCE_AT_SENSORS && (t > LEAST_T_OF_DEPENDENCE_AT_SENSORS || lined_up)
 }
 
 /// Whether a free dependence that does not stand is still to be told: noise that the sensors do not make plausible

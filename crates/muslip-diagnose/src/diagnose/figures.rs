@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 
 use super::answer::Answer;
 use super::named::least_delay;
-use crate::constants::VAGUE_DELAY_S;
-use crate::looked::{POWER, looked_for};
+use crate::constants::{POWER, VAGUE_DELAY_S};
+use crate::looked::looked_for;
 use crate::mechanism::{Balance, Id};
 use crate::number::finite_or_zero;
 use crate::outcome::{ChannelNoise, Fit, LookedFor, MinimumDetectable, Trace, ValueAndStd};

@@ -11,7 +11,7 @@ use crate::constants::{
 use crate::decide::{Claim, Trial, softness, stands};
 use crate::figures::{figures, with_form};
 use crate::innovations::dependence::Dependence;
-use crate::mechanism::{Id, Reported, Speed};
+use crate::mechanism::{Balance, Id, Reported, Speed};
 use crate::number::finite_or_zero;
 use crate::outcome::{
     Alternative, Evidence, NamedMechanism, ReportedParameter, Unexplained, sentence,
@@ -118,7 +118,8 @@ impl Answer<'_> {
         unlikely.collect()
     }
 
-    /// What no name accounts for: dependences of the chosen model, and the one that is left beside it.
+    /// What no name accounts for: dependences of the chosen model, the one that is left beside it, and a hum that stands
+    /// out of the noise.
     pub(super) fn unexplained(&self) -> Vec<Unexplained> {
         let gained: f64 = (self.decision.base.loss - self.decision.chosen.loss).max(1e-9);
         let left = self.decision.left.iter();
@@ -147,7 +148,15 @@ impl Answer<'_> {
                 .unwrap_or(0.0);
             (own, gain, gain / gained)
         });
-        chosen.chain(left).map(told).collect()
+        let hum = self.audit.loud_hum.iter().map(|hum| Unexplained {
+            balance: Balance::Tyre.as_str(),
+            // The contract's word for a fixed frequency.
+            variable: "time_s".into(),
+            form: hum.finding.statement.trim_end_matches('.').to_owned(),
+            z: finite_or_zero(hum.finding.value / hum.finding.std),
+            share: hum.share.clamp(0.0, 1.0),
+        });
+        chosen.chain(left).map(told).chain(hum).collect()
     }
 
     /// Delays of the speeds that the base simulation's residuals show.

@@ -128,17 +128,17 @@ fn on(data: &Data, variable: &Variable) -> Vec<Dependence> {
             .map(|&count| knots(data, &values, balance, count))
             .filter(|knots| !knots.is_empty())
             .collect();
-        let actions: &[Action] = if balance == Balance::Tyre {
-            &[Action::Friction, Action::Force]
-        } else {
-            &[Action::Force]
-        };
-        for (&action, knots) in actions
-            .iter()
+        let mut actions = vec![Action::Force];
+        if balance == Balance::Tyre {
+            actions.push(Action::Friction);
+            actions.extend(along_slip(variable));
+        }
+        for (action, knots) in actions
+            .into_iter()
             .flat_map(|a| shapes.iter().map(move |k| (a, k)))
         {
             let reference =
-                (action == Action::Friction).then(|| fullest(data, &values, balance, knots));
+                (action != Action::Force).then(|| fullest(data, &values, balance, knots));
             out.push(Dependence {
                 balance,
                 variable: variable.clone(),
@@ -167,6 +167,23 @@ fn wave(data: &Data, balance: Balance, angles: &Arc<Vec<Vec<f64>>>) -> Option<De
         shape: Shape::Wave { runs },
         values: Arc::clone(angles),
     })
+}
+
+/// How a variable acts along the slip, if it may: what changes the tyre moves its peak, and a speed may be read wrongly.
+/// Over slip itself that is another curve, which friction by slip says already.
+fn along_slip(variable: &Variable) -> Option<Action> {
+    match variable {
+        Variable::NormalForce | Variable::Time | Variable::Column(_) => Some(Action::CriticalSlip),
+        Variable::VehicleSpeed => Some(Action::Slip),
+        Variable::Slip
+        | Variable::SlidingSpeed
+        | Variable::SinceOnset
+        | Variable::Distance
+        | Variable::WheelAngle
+        | Variable::SlipRate
+        | Variable::NormalForceRate
+        | Variable::VehicleSpeedRate => None,
+    }
 }
 
 /// Whether a variable holds the noise of a balance's own level: a rate of the level's speed, integrated again, is

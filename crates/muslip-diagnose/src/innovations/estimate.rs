@@ -8,14 +8,9 @@ use rayon::prelude::*;
 use super::gram::{Columns, Packed, Solved, solve};
 use super::noise::{BalanceParts, Source};
 use super::whiten::{ByVariance, Course, Kind, Lanes, MOST, Whitener, traces, whiteners};
+use crate::constants::{LOG_SIZE_STD, LOG_SIZE_STD_BEYOND};
 use crate::data::Data;
 
-/// Prior standard deviation of a part's log size about where it starts: wide, so that a part that the data say
-/// nothing of stays plausible.
-const PRIOR: f64 = 3.0;
-/// The same of how far it lies beyond what the sensors make plausible: what belongs to a run or goes slowly could
-/// otherwise take up any effect at no cost.
-const PRIOR_BEYOND: f64 = 0.8;
 /// Farthest a log size goes from its start.
 const FARTHEST: f64 = 7.0;
 /// The same of a walk.
@@ -48,13 +43,13 @@ pub fn penalty(parts: &BalanceParts) -> f64 {
     parts
         .sources
         .iter()
-        .map(|s| 0.5 * ((s.log_std - s.log_start) / PRIOR).powi(2) + 0.5 * beyond(s).powi(2))
+        .map(|s| 0.5 * ((s.log_std - s.log_start) / LOG_SIZE_STD).powi(2) + 0.5 * beyond(s).powi(2))
         .sum()
 }
 
 /// By how many of its priors a size lies beyond what the sensors make plausible.
 fn beyond(source: &Source) -> f64 {
-    ((source.log_std - source.log_cap) / PRIOR_BEYOND).max(0.0)
+    ((source.log_std - source.log_cap) / LOG_SIZE_STD_BEYOND).max(0.0)
 }
 
 /// A log size no farther from where it starts than it may go.
@@ -71,17 +66,18 @@ fn within_reach(source: &Source, log_std: f64) -> f64 {
 
 /// Slope of [`penalty`] by the log size of one part.
 fn penalty_slope(source: &Source) -> f64 {
-    (source.log_std - source.log_start) / (PRIOR * PRIOR) + beyond(source) / PRIOR_BEYOND
+    (source.log_std - source.log_start) / (LOG_SIZE_STD * LOG_SIZE_STD)
+        + beyond(source) / LOG_SIZE_STD_BEYOND
 }
 
 /// Curvature of [`penalty`] by the same.
 fn penalty_curvature(source: &Source) -> f64 {
     let of_cap = if beyond(source) > 0.0 {
-        PRIOR_BEYOND.powi(-2)
+        LOG_SIZE_STD_BEYOND.powi(-2)
     } else {
         0.0
     };
-    PRIOR.powi(-2) + of_cap
+    LOG_SIZE_STD.powi(-2) + of_cap
 }
 
 /// The balance under noise of these sizes.

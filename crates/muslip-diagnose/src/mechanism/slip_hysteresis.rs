@@ -9,10 +9,13 @@ pub enum Form {
     Friction,
     /// Slip: the patch feels a slip that follows the wheel's with a play, and nothing where the curve is level.
     Slip,
+    /// Friction, but the more the faster slip changes, up to a rate: what this says much better is no loop, for a loop does
+    /// not depend on the rate.
+    Rate,
 }
 
 /// All forms.
-pub const FORMS: [Form; 2] = [Form::Friction, Form::Slip];
+pub const FORMS: [Form; 3] = [Form::Friction, Form::Slip, Form::Rate];
 
 /// Least half of a play, in slip: far below what any speed tells.
 const LEAST_HALF_PLAY: f64 = 1e-4;
@@ -24,16 +27,21 @@ pub struct SlipHysteresis {
 }
 
 /// Part of the way from the middle of the loop to its branch, by sample: 1 where slip has risen for long, -1 where it has
-/// fallen, 0 where the wheel does not roll; `width` is the slip over which it turns.
-fn branch<T: Number>(width: T, series: &Series, slip: &[T]) -> Vec<T> {
+/// fallen, 0 where the wheel does not roll; `width` is the slip over which it turns. Where a rate is given slower changes go
+/// as much less far.
+fn branch<T: Number>(width: T, full_rate: Option<T>, series: &Series, slip: &[T]) -> Vec<T> {
     let mut z = T::constant(0.0);
     let mut all = vec![z; slip.len()];
     for k in 1..slip.len() {
         if series.rolling[k] && series.rolling[k - 1] {
             let change = slip[k] - slip[k - 1];
             let direction = if change.value() >= 0.0 { 1.0 } else { -1.0 };
+            let branch = match full_rate.map(|rate| change / (rate * series.dt[k])) {
+                Some(share) if share.value().abs() < 1.0 => share,
+                _ => T::constant(direction),
+            };
             let stay = (-(change.abs() / width)).exp();
-            z = (z - direction) * stay + direction;
+            z = (z - branch) * stay + branch;
             all[k] = z;
         }
     }
@@ -65,6 +73,12 @@ impl Describe for SlipHysteresis {
                 Stage::Friction,
                 "friction = mu(slip) * (1 + loop_share * z), dz/d(slip) = (sign(d slip) - z)/width * sign(d slip)",
             ),
+            Form::Rate => (
+                "rate",
+                Some(0),
+                Stage::Friction,
+                "friction = mu(slip) * (1 + loop_share * z), dz/d(slip) = (r - z)/width * sign(d slip), r = min(max(rate/full_rate, -1), 1)",
+            ),
             Form::Slip => (
                 "slip",
                 None,
@@ -75,6 +89,7 @@ impl Describe for SlipHysteresis {
         Facts {
             form,
             amplitude,
+            rival: self.form == Form::Rate,
             ..Facts::of(Id::SlipHysteresis, stage, equation)
         }
     }
@@ -85,13 +100,22 @@ impl Describe for SlipHysteresis {
                 Parameter::new("width", "1", 0.001, 0.15),
             ],
             Form::Slip => vec![Parameter::new("half_play", "1", LEAST_HALF_PLAY, 0.1)],
+            Form::Rate => vec![
+                Parameter::new("loop_share", "1", -0.6, 0.6),
+                Parameter::new("width", "1", 0.001, 0.15),
+                Parameter::new("full_rate", "1/s", 0.01, 20.0),
+            ],
         }
     }
-    fn starts(&self, _search: &Search<'_>) -> Vec<Vec<f64>> {
+    fn starts(&self, search: &Search<'_>) -> Vec<Vec<f64>> {
         let sizes = [0.003, 0.012, 0.04].into_iter();
+        let critical = search.context.nominal[1];
         match self.form {
             Form::Friction => sizes.map(|width| vec![0.0, width]).collect(),
             Form::Slip => sizes.map(|half_play| vec![half_play]).collect(),
+            Form::Rate => [2.0, 8.0]
+                .map(|rate| vec![0.0, 0.012, rate * critical])
+                .to_vec(),
         }
     }
     fn statement(&self, reported: &[Reported<f64>], _p: &[f64]) -> String {
@@ -100,6 +124,9 @@ impl Describe for SlipHysteresis {
             Form::Friction => format!(
                 "friction follows a loop: rising and falling slip differ by {percent:.1} % either side of their mean, whatever the rate"
             ),
+            Form::Rate => {
+                format!("friction depends on how fast slip changes, by {percent:.1} % at most")
+            }
             Form::Slip => format!(
                 "friction follows a loop: the tyre's slip follows the wheel's with a play, so rising and falling slip differ by {percent:.1} % either side of their mean half way to the peak, and by nothing at it, whatever the rate"
             ),
@@ -125,8 +152,9 @@ impl Describe for SlipHysteresis {
 impl<T: Number> Mechanism<T> for SlipHysteresis {
     fn apply(&self, p: &[T], series: &Series, _context: &Context, state: &mut State<T>) {
         match self.form {
-            Form::Friction => {
-                let branch = branch(p[1], series, &state.slip);
+            Form::Friction | Form::Rate => {
+                let full_rate = (self.form == Form::Rate).then(|| p[2]);
+                let branch = branch(p[1], full_rate, series, &state.slip);
                 for (friction, z) in state.friction.iter_mut().zip(branch) {
                     *friction = *friction * (p[0] * z + 1.0);
                 }
@@ -137,7 +165,7 @@ impl<T: Number> Mechanism<T> for SlipHysteresis {
     fn report(&self, p: &[T], fitted: &Fitted<'_, T>) -> Vec<Reported<T>> {
         let loop_share = |share: T| Reported::new("loop_share", "1", share);
         match self.form {
-            Form::Friction => vec![loop_share(p[0].abs())],
+            Form::Friction | Form::Rate => vec![loop_share(p[0].abs())],
             // Half way to the peak, where the curve is steep and friction not small.
             Form::Slip => {
                 let at = |relative: T| fitted.law.friction(relative);
@@ -167,7 +195,7 @@ mod tests {
             rolling: vec![true; slip.len()],
             ..Series::default()
         };
-        let z: Vec<f64> = branch(0.02, &series, &slip);
+        let z: Vec<f64> = branch(0.02, None, &series, &slip);
         // 1 - exp(-s / width) on the way up; after the turn back by s: -1 + 2 exp(-s / width), as good as.
         for (k, s) in [(1, 0.002), (10, 0.02), (50, 0.1)] {
             assert!((z[k] - (1.0 - f64::exp(-s / 0.02))).abs() < 1e-9);
@@ -180,7 +208,28 @@ mod tests {
             rolling: vec![false; slip.len()],
             ..Series::default()
         };
-        assert!(branch(0.02, &still, &slip).iter().all(|z| *z == 0.0));
+        assert!(branch(0.02, None, &still, &slip).iter().all(|z| *z == 0.0));
+    }
+
+    #[test]
+    fn where_a_loop_asks_for_a_rate_slip_that_changes_at_half_of_it_goes_half_way() {
+        let step_s = 0.01;
+        // Up to a slip of 0.2 at 0.4 a second, and back at 2 a second.
+        let up = (0..=50).map(|k| 0.004 * f64::from(k));
+        let down = (1..=10).map(|k| 0.2 - 0.02 * f64::from(k));
+        let slip: Vec<f64> = up.chain(down).collect();
+        let series = Series {
+            rolling: vec![true; slip.len()],
+            dt: vec![step_s; slip.len()],
+            ..Series::default()
+        };
+        let at = |full_rate: f64| branch(0.02, Some(full_rate), &series, &slip);
+        assert!((at(0.8)[50] - 0.5).abs() < 1e-3);
+        assert!((at(0.8)[60] + 1.0).abs() < 1e-3);
+        // One that asks for next to none is a loop.
+        let slow = at(1e-6);
+        let loops: Vec<f64> = branch(0.02, None, &series, &slip);
+        assert!(slow.iter().zip(loops).all(|(a, b)| (a - b).abs() < 1e-12));
     }
 
     #[test]

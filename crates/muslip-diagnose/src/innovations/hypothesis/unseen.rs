@@ -1,6 +1,7 @@
 //! How likely a model makes what it was not fitted to.
 
 use super::columns::{bounds, own_parameters};
+use crate::constants::UNREAD_SHARE_OF_RANGE;
 use crate::data::Data;
 use crate::innovations::candidates::Table;
 use crate::innovations::gram::{Gram, Solved, solve, total};
@@ -16,9 +17,6 @@ pub struct Unseen {
     pub halves: Vec<f64>,
 }
 
-/// What is known of a parameter without any reading: its standard deviation as a share of its range.
-const SHARE_OF_RANGE: f64 = 0.3;
-
 /// What a model says of every run and half run that it were not fitted to.
 pub fn unseen(data: &Data, model: &Model, table: &Table, grams: &[[Gram; 2]]) -> Option<Unseen> {
     let sum = total(grams);
@@ -26,7 +24,7 @@ pub fn unseen(data: &Data, model: &Model, table: &Table, grams: &[[Gram; 2]]) ->
     let bounds = bounds(data, model);
     let own = own_parameters(model);
     let wide = |i: usize| match own.get(i - 1) {
-        Some(&p) => (SHARE_OF_RANGE * (bounds[p].1 - bounds[p].0)).powi(-2),
+        Some(&p) => (UNREAD_SHARE_OF_RANGE * (bounds[p].1 - bounds[p].0)).powi(-2),
         None => precision(table, i),
     };
     let all = solve(&sum.products, &chosen, &wide)?;
