@@ -347,8 +347,12 @@ impl<'a> Coupling<'a> {
             .repaired
             .corrections
             .iter()
-            // A force that is added may be the load cell's; friction is the contact's.
-            .filter(|c| Action::parse(&c.acts_on) != Some(Action::Force))
+            // A force that is added may be the load cell's, and a slip that is read wrongly is no slip; the rest is the
+            // contact's.
+            .filter(|c| match Action::parse(&c.acts_on) {
+                Some(Action::Friction | Action::CriticalSlip) => true,
+                Some(Action::Force | Action::Slip) | None => false,
+            })
             .collect();
         if !acting.is_empty() {
             let levers = Levers::new(data, &self.tyre);

@@ -113,6 +113,9 @@ pub const LEAST_T_OF_DEPENDENCE_AT_SENSORS: f64 = 2.4;
 /// Least logarithm by which a dependence lowers the mean square error of the drag, where few runs reach what it depends on and
 /// none speaks against it: no t shows that. None of 120 development campaigns that lack nothing has more than 0.37.
 pub const LINED_UP_PREDICTED_BY_DEPENDENCE: f64 = 0.5;
+/// As [`LINED_UP_PREDICTED_BY_DEPENDENCE`], nats at the sensors' noise from which [`LEAST_PREDICTED_BY_DEPENDENCE`] is enough:
+/// none of those campaigns has 300.
+pub const LARGE_GAIN_OF_DEPENDENCE_AT_SENSORS: f64 = 500.0;
 /// Logarithm by which a hidden dependence lowers the mean square error of the drag at least.
 pub const LEAST_PREDICTED_BY_DEPENDENCE: f64 = 0.05;
 

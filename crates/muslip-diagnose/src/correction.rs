@@ -4,7 +4,7 @@
 use rayon::prelude::*;
 
 use crate::data::Data;
-use crate::model::{Model, tyre};
+use crate::model::{Model, friction_about, tyre};
 use crate::series::Series;
 
 /// How columns of a variable act.
@@ -21,6 +21,9 @@ pub enum Action {
 }
 
 impl Action {
+    /// All of them.
+    const ALL: [Self; 4] = [Self::Friction, Self::Force, Self::CriticalSlip, Self::Slip];
+
     /// Word used in files and sentences.
     #[must_use]
     pub fn as_str(self) -> &'static str {
@@ -34,9 +37,7 @@ impl Action {
     /// Inverse of `as_str`.
     #[must_use]
     pub fn parse(word: &str) -> Option<Self> {
-        [Self::Friction, Self::Force, Self::CriticalSlip, Self::Slip]
-            .into_iter()
-            .find(|a| a.as_str() == word)
+        Self::ALL.into_iter().find(|a| a.as_str() == word)
     }
 }
 
@@ -106,15 +107,14 @@ impl Levers {
         let p = model.vector();
         let of_run = |series: &Series| {
             let state = tyre(&data.catalogue, model, &p, series, &data.context);
-            let critical = state.law.critical;
-            let slip: Vec<f64> = (0..state.slip.len())
-                .map(|k| {
-                    let x = state.slip[k] / critical;
-                    let h = 1e-4;
-                    let slope = (state.law.friction(x + h) - state.law.friction(x - h)) / (2.0 * h);
-                    slope * state.load[k] / critical
-                })
-                .collect();
+            let ([before, _, after], step) =
+                friction_about(&data.catalogue, model, &p, series, &data.context);
+            // A wheel that stands has no slip to be misread.
+            let by_slip = |k: usize| {
+                let slope = state.load[k] * (after[k] - before[k]) / (2.0 * step);
+                if series.rolling[k] { slope } else { 0.0 }
+            };
+            let slip: Vec<f64> = (0..state.slip.len()).map(by_slip).collect();
             let by_critical = slip
                 .iter()
                 .zip(&state.slip)
@@ -151,24 +151,47 @@ impl Levers {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::innovations::toy::{CRITICAL, Noise, PEAK, stop};
+    use crate::innovations::toy::{CRITICAL, Noise, PEAK, entry_of, stop};
+    use crate::mechanism::Id;
+    use crate::model::Term;
 
     #[test]
-    fn levers_are_what_the_force_changes_by() {
-        let data = stop(Noise::NONE, 4);
-        let levers = |peak, critical| Levers::new(&data, &Model::of_law(peak, critical));
-        let (here, h) = (levers(PEAK, CRITICAL), 1e-5);
+    fn every_action_has_a_word_of_its_own() {
+        for action in Action::ALL {
+            assert_eq!(Action::parse(action.as_str()), Some(action));
+        }
+        assert_eq!(Action::parse("hope"), None);
+    }
+
+    #[test]
+    fn levers_are_what_the_force_changes_by_and_nothing_where_the_wheel_stands() {
+        let mut data = stop(Noise::NONE, 4);
+        let still = data.series[0].len() / 2;
+        data.series[0].rolling[still] = false;
+        let wears = Term {
+            entry: entry_of(&data, Id::WearDrift),
+            parameters: vec![0.2],
+        };
+        let levers = |critical| {
+            let mut model = Model::of_law(PEAK, critical);
+            model.terms.push(wears.clone());
+            Levers::new(&data, &model)
+        };
+        let (here, h) = (levers(CRITICAL), 1e-5);
         let largest = |of: &[f64]| of.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
-        let longer = levers(PEAK, CRITICAL * (1.0 + h));
+        let longer = levers(CRITICAL * (1.0 + h));
         let series = &data.series[0];
         for k in 0..series.len() {
             let changed = (longer.force[0][k] - here.force[0][k]) / h;
             assert!((changed - here.critical[0][k]).abs() < 1e-3 * largest(&here.critical[0]));
             // As much more slip leaves as much less of a longer curve.
-            let slip = series.slip(k, data.context.radius);
-            assert!((here.critical[0][k] + slip * here.slip[0][k]).abs() < 1e-6);
+            if series.rolling[k] {
+                let slip = series.slip(k, data.context.radius);
+                assert!((here.critical[0][k] + slip * here.slip[0][k]).abs() < 1e-6);
+            }
         }
         assert!(largest(&here.critical[0]) > 0.1 * largest(&here.force[0]));
+        assert!(here.slip[0][still] == 0.0);
     }
 
     #[test]

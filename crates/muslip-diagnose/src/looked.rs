@@ -29,6 +29,9 @@ pub fn seen(data: &Data, candidates: &[Candidate], scores: &[Score], threshold: 
             let candidate = &candidates[score.candidate];
             let (id, entry) = (candidate.id?, candidate.entry?);
             let mechanism = data.catalogue.get(entry);
+            if mechanism.facts().counter_form {
+                return None;
+            }
             let Some(amplitude) = mechanism.facts().amplitude else {
                 let size = score.sizes.iter().copied().fold(0.0, f64::max);
                 return Some(Seen {

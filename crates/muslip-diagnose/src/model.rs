@@ -186,6 +186,23 @@ pub fn friction<T: Listed>(
     state
 }
 
+/// Step of a curve's derivatives, in critical slips.
+const CURVE_STEP: f64 = 1e-3;
+
+/// Friction a step below the slip, at it and a step beyond it, by sample, with all that the terms make of the law; and that
+/// step.
+pub fn friction_about(
+    catalogue: &Catalogue,
+    model: &Model,
+    p: &[f64],
+    series: &Series,
+    context: &Context,
+) -> ([Vec<f64>; 3], f64) {
+    let step = CURVE_STEP * model.base[1].exp();
+    let at = |beyond: f64| friction::<f64>(catalogue, model, p, series, context, beyond).friction;
+    ([-step, 0.0, step].map(at), step)
+}
+
 /// Runs the tyre model on one recording up to the reading; `state.contact` is the force in the contact.
 pub fn tyre<T: Listed>(
     catalogue: &Catalogue,

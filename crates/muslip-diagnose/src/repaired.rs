@@ -47,7 +47,8 @@ pub struct RepairedParameter {
 pub struct Correction {
     /// Variable.
     pub variable: String,
-    /// `friction` (a factor 1 + c), `force` (added, in units of the mean load) or `critical_slip`.
+    /// `friction` (a factor 1 + c), `force` (added, in units of the mean load), `critical_slip` (a factor 1 + c) or `slip`
+    /// (added to the slip that is read).
     pub acts_on: String,
     /// Short form in words; empty where only the table holds.
     #[serde(default)]

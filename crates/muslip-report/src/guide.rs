@@ -41,8 +41,8 @@ pub struct Section {
 
 /// Label of an equation.
 const EQUATION: &str = "equation";
-/// Label of one that the recordings must not ask for.
-const RIVAL: &str = "not where this says clearly more";
+/// Label of one of what the mechanism is mistaken for: where it says clearly more, the mechanism is refuted.
+const COUNTER_FORM: &str = "refuted by";
 
 /// The guide's section of a mechanism.
 #[must_use]
@@ -51,9 +51,9 @@ pub fn section(id: Id) -> Section {
     let mut row = |label, text: String, about| rows.push(Row { label, text, about });
     row("left out", id.what().to_owned(), None);
     let entries = id.entries();
-    for (label, rival) in [(EQUATION, false), (RIVAL, true)] {
+    for (label, counter) in [(EQUATION, false), (COUNTER_FORM, true)] {
         let mut equations: Vec<&str> = Vec::new();
-        for entry in entries.iter().filter(|e| e.facts().rival == rival) {
+        for entry in entries.iter().filter(|e| e.facts().counter_form == counter) {
             if !equations.contains(&entry.equation()) {
                 equations.push(entry.equation());
             }
@@ -185,7 +185,7 @@ pub fn markdown() -> String {
         );
         for row in section.rows {
             let text = match (row.label, row.about) {
-                (EQUATION | RIVAL, _) => format!("`{}`", row.text),
+                (EQUATION | COUNTER_FORM, _) => format!("`{}`", row.text),
                 (_, Some(about)) => {
                     let said = spoken(about.as_str());
                     let rest = row.text.strip_prefix(&said).unwrap_or(&row.text);

@@ -118,7 +118,7 @@ impl ModelUse {
         for correction in &model.corrections {
             used.mechanisms.push(ModelledMechanism {
                 id: "correction".to_owned(),
-                form: format!("{} of {}", correction.acts_on, correction.variable),
+                form: format!("{} over {}", correction.acts_on, correction.variable),
                 parameters: Vec::new(),
                 not_compensated: Some("a table without a named mechanism"),
             });

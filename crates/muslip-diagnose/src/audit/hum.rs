@@ -198,6 +198,8 @@ fn turns(windows: &[Window], hz: f64, by_clock: f64) -> bool {
 pub struct Hum {
     /// Its amplitude in N, and its frequency in words.
     pub finding: Finding,
+    /// Its frequency, Hz.
+    pub frequency_hz: f64,
     /// Its share of the square of what is rough in the drag: the rest is noise.
     pub share: f64,
 }
@@ -239,7 +241,11 @@ pub fn hum(runs: &[Recording]) -> Option<Hum> {
     let squares = |w: &Window| w.rough.iter().map(|x| x * x).sum::<f64>() / w.rough.len() as f64;
     // A line's power is a quarter of its squared amplitude, its mean square a half.
     let share = 2.0 * by_clock.iter().sum::<f64>() / windows.iter().map(squares).sum::<f64>();
-    Some(Hum { finding, share })
+    Some(Hum {
+        finding,
+        frequency_hz: hz,
+        share,
+    })
 }
 
 #[cfg(test)]
@@ -274,8 +280,12 @@ mod tests {
 
     #[test]
     fn a_line_of_the_clock_is_hum_and_one_of_the_wheel_is_not() {
-        let Hum { finding, share } =
-            hum(&runs(30.0, |t, _| core::f64::consts::TAU * 49.97 * t)).unwrap();
+        let Hum {
+            finding,
+            frequency_hz,
+            share,
+        } = hum(&runs(30.0, |t, _| core::f64::consts::TAU * 49.97 * t)).unwrap();
+        assert!((frequency_hz - 49.97).abs() < 0.02, "{frequency_hz}");
         assert!((finding.value / 30.0 - 1.0).abs() < 0.1, "{finding:?}");
         assert!(finding.statement.contains("49.9"), "{}", finding.statement);
         // Noise that is even between -30 N and 30 N, a hum of 30 N: 450 of 300 and 450 square newtons.

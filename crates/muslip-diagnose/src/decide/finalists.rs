@@ -84,7 +84,7 @@ fn gain_at_start(data: &Data, candidate: &Candidate, score: &Score) -> f64 {
 }
 
 /// Best candidates of a screen but of the ids passed over: at most `count` ids, at most two forms of each, each form at
-/// its best start.
+/// its best start; and beside them the counter-forms of these ids.
 fn best(
     data: &Data,
     candidates: &[Candidate],
@@ -96,7 +96,11 @@ fn best(
     let price = |s: &Score| {
         PRICE_OF_PARAMETER * candidates[s.candidate].columns.len() as f64 + PRICE_OF_NAME
     };
-    let mut best_first: Vec<&Score> = all.iter().collect();
+    let counter = |s: &Score| {
+        let entry = candidates[s.candidate].entry;
+        entry.is_some_and(|entry| data.catalogue.get(entry).facts().counter_form)
+    };
+    let mut best_first: Vec<&Score> = all.iter().filter(|s| !counter(s)).collect();
     best_first.sort_by(|a, b| (b.gain - price(b)).total_cmp(&(a.gain - price(a))));
     let mut out: Vec<(usize, Score)> = Vec::new();
     let mut ids: Vec<Id> = Vec::new();
@@ -137,6 +141,18 @@ fn best(
             .max_by(|a, b| at_start(a).total_cmp(&at_start(b)))
             .unwrap_or(score);
         out.push((best.candidate, best.clone()));
+    }
+    let of_ids = |s: &&Score| {
+        let id = candidates[s.candidate].id;
+        counter(s) && s.gain > price(s) && id.is_some_and(|id| ids.contains(&id))
+    };
+    let mut counters: Vec<&Score> = all.iter().filter(of_ids).collect();
+    counters.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+    for score in counters {
+        let same = |c: usize| candidates[c].entry == candidates[score.candidate].entry;
+        if !out.iter().any(|(c, _)| same(*c)) {
+            out.push((score.candidate, score.clone()));
+        }
     }
     out
 }

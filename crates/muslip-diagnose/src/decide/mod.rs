@@ -136,6 +136,8 @@ struct TakenUp {
     at_sensors: f64,
     /// Names that stood beside what was taken up before, and how much spoke for each.
     stood: Vec<(Id, f64)>,
+    /// Names that counter-forms refuted: beside what was taken up in their place they are what its form leaves.
+    refuted: Vec<Id>,
 }
 
 impl TakenUp {
@@ -216,7 +218,7 @@ impl Question<'_> {
         let before = Before::new(data, so_far, self.untold, taken_up.at_sensors);
         let screen = Screen::new(data, before, &self.free, self.excluded);
         let mut trials = screen.trials();
-        refute_by_rivals(data, &mut trials);
+        refute(data, &mut trials, &taken_up.refuted);
         self.hold_beside_chain(&[], &mut trials, taken_up);
         // What only the chain remembers has taken the place of other names.
         let of_chain = trials.iter().any(|t| !t.outlasts_chain);
@@ -228,6 +230,7 @@ impl Question<'_> {
             let mut others = screen.trials_without(&tried);
             self.hold_beside_chain(&trials, &mut others, taken_up);
             trials.extend(others);
+            refute(data, &mut trials, &taken_up.refuted);
             rank(data, &mut trials);
         }
         (trials, screen.seen())
@@ -272,22 +275,31 @@ impl Question<'_> {
     }
 }
 
-/// Takes names from trials that a rival form clearly outweighs: what there is of it is something else.
-fn refute_by_rivals(data: &Data, trials: &mut [Trial]) {
-    let rival = |t: &Trial| {
-        let (id, entry) = t.mechanism()?;
-        let is_rival = data.catalogue.get(entry).facts().rival;
-        is_rival.then(|| (id, t.weight()))
+/// Names that a counter-form clearly outweighs: what there is of them is something else.
+fn refuted(data: &Data, trials: &[Trial]) -> Vec<Id> {
+    let weights = |counter: bool| {
+        trials.iter().filter_map(move |t| {
+            let (id, entry) = t.mechanism()?;
+            let own = data.catalogue.get(entry).facts().counter_form == counter;
+            own.then(|| (id, t.weight()))
+        })
     };
-    let rivals: Vec<(Id, f64)> = trials.iter().filter_map(rival).collect();
+    let most = |id: Id, counter: bool| {
+        let own = weights(counter).filter(|own| own.0 == id);
+        own.map(|own| own.1).fold(f64::NEG_INFINITY, f64::max)
+    };
+    weights(true)
+        .filter(|&(id, weight)| weight - most(id, false) > softness(weight))
+        .map(|own| own.0)
+        .collect()
+}
+
+/// Takes names from trials that these refute, or that were refuted before.
+fn refute(data: &Data, trials: &mut [Trial], before: &[Id]) {
+    let now = refuted(data, trials);
     for trial in trials {
-        let refuted = trial.mechanism().is_some_and(|(id, _)| {
-            let own = trial.weight();
-            let outweighs =
-                |&(other, weight): &(Id, f64)| other == id && weight - own > softness(weight);
-            rivals.iter().any(outweighs)
-        });
-        trial.own &= !refuted;
+        let lost = |id: Id| now.contains(&id) || before.contains(&id);
+        trial.own &= !trial.mechanism().is_some_and(|(id, _)| lost(id));
     }
 }
 
@@ -350,6 +362,7 @@ pub fn decide(data: &Data, base: Judged, excluded: &[Id], untold: Untold) -> Dec
         if best.is_none() {
             left = Left::of(&trials, taken_up.at_sensors);
         }
+        taken_up.refuted.extend(refuted(data, &trials));
         rounds.push(trials);
         let Some(trial) = best else { break };
         taken_up.add(&trial);
@@ -491,29 +504,39 @@ mod tests {
         assert!(is_open(200.0, 0.6, false));
         assert!(!is_open(200.0, 0.6, true));
         assert!(!is_open(200.0, 0.4, false) && !is_open(100.0, 0.6, false));
+        // Of a large gain less is asked.
+        assert!(is_open(600.0, 0.1, false));
+        assert!(!is_open(600.0, 0.1, true) && !is_open(600.0, 0.04, false));
     }
 
     #[test]
-    fn a_name_is_refuted_by_its_rival_form_where_that_says_clearly_more() {
+    fn a_name_is_refuted_by_its_counter_form_where_that_says_clearly_more() {
         let data = stop(Noise::TYPICAL, 4);
         let base = toy::settled(&data);
         let entries = data.catalogue.entries();
-        let rival = entries.iter().position(|m| m.facts().rival).unwrap();
-        let stays = |of_rival: f64, named: Id| {
+        let counter = entries.iter().position(|m| m.facts().counter_form).unwrap();
+        let stays_beside = |before: &[Id], of_counter: f64, named: Id| {
             let mut trials = [
                 of_name(&data, &base, named, 100.0, 3.0),
                 Trial {
-                    claim: Claim::Mechanism(entries[rival].id(), rival),
-                    ..of_name(&data, &base, Id::SlipHysteresis, of_rival, 3.0)
+                    claim: Claim::Mechanism(entries[counter].id(), counter),
+                    ..of_name(&data, &base, Id::SlipHysteresis, of_counter, 3.0)
                 },
             ];
-            refute_by_rivals(&data, &mut trials);
+            refute(&data, &mut trials, before);
             trials[0].own
         };
+        let stays = |of_counter: f64, named: Id| stays_beside(&[], of_counter, named);
         // Softness of 110 nats is 7.3.
         assert!(!stays(110.0, Id::SlipHysteresis));
         assert!(stays(106.0, Id::SlipHysteresis));
         assert!(stays(900.0, Id::LoadSensitivity));
+        // Once refuted it stays so beside what was taken up in its place.
+        assert!(!stays_beside(
+            &[Id::SlipHysteresis],
+            10.0,
+            Id::SlipHysteresis
+        ));
     }
 
     #[test]

@@ -2,13 +2,13 @@
 
 use crate::chain::timing::Untold;
 use crate::constants::{
-    CLEARLY_PREDICTED, DEPENDENCE_WORTH, INDIFFERENT_NATS, LARGE_GAIN_AT_SENSORS, LEAST_EFFECT,
-    LEAST_GAIN, LEAST_GAIN_AT_SENSORS, LEAST_GAIN_OF_DEPENDENCE_AT_SENSORS, LEAST_MEMORY_S,
-    LEAST_PREDICTED, LEAST_PREDICTED_BY_DEPENDENCE, LEAST_T, LEAST_T_AT_SENSORS,
-    LEAST_T_AT_SENSORS_NOT_FED, LEAST_T_NOT_FED, LEAST_T_OF_DEPENDENCE,
-    LEAST_T_OF_DEPENDENCE_AT_SENSORS, LEAST_T_OF_LARGE, LEAST_T_OF_LIKELIER, LINED_UP_PREDICTED,
-    LINED_UP_PREDICTED_BY_DEPENDENCE, MOST_AGAINST, PRICE_OF_NAME, PRICE_OF_PARAMETER,
-    REAL_MEMORY_PREDICTED, REAL_MEMORY_T,
+    CLEARLY_PREDICTED, DEPENDENCE_WORTH, INDIFFERENT_NATS, LARGE_GAIN_AT_SENSORS,
+    LARGE_GAIN_OF_DEPENDENCE_AT_SENSORS, LEAST_EFFECT, LEAST_GAIN, LEAST_GAIN_AT_SENSORS,
+    LEAST_GAIN_OF_DEPENDENCE_AT_SENSORS, LEAST_MEMORY_S, LEAST_PREDICTED,
+    LEAST_PREDICTED_BY_DEPENDENCE, LEAST_T, LEAST_T_AT_SENSORS, LEAST_T_AT_SENSORS_NOT_FED,
+    LEAST_T_NOT_FED, LEAST_T_OF_DEPENDENCE, LEAST_T_OF_DEPENDENCE_AT_SENSORS, LEAST_T_OF_LARGE,
+    LEAST_T_OF_LIKELIER, LINED_UP_PREDICTED, LINED_UP_PREDICTED_BY_DEPENDENCE, MOST_AGAINST,
+    PRICE_OF_NAME, PRICE_OF_PARAMETER, REAL_MEMORY_PREDICTED, REAL_MEMORY_T,
 };
 use crate::data::Data;
 use crate::innovations::dependence::Dependence;
@@ -78,7 +78,8 @@ pub struct Trial {
     /// Whether nothing was named before it in its balance, errors of the speeds left aside, or less than it gains at the
     /// sensors' noise: what a name leaves is easily that name's own form.
     pub first: bool,
-    /// Whether its parameters are the mechanism's own, and not at a limit where its form is another's.
+    /// Whether its parameters are the mechanism's own, and not at a limit where its form is another's; and no counter-form
+    /// refutes it.
     pub own: bool,
     /// Another mechanism that its parameters say as well.
     pub says_as_well: Option<Id>,
@@ -259,7 +260,7 @@ impl<'a> Before<'a> {
         });
         let own = term.is_none_or(|(_, entry, p)| {
             let mechanism = data.catalogue.get(entry);
-            mechanism.owns(p, &data.context) && !mechanism.facts().rival
+            mechanism.owns(p, &data.context) && !mechanism.facts().counter_form
         });
         let real = in_force && predicts > REAL_MEMORY_PREDICTED && at_sensors.1 > REAL_MEMORY_T;
         let memory_s = term.and_then(|(id, entry, p)| {
@@ -421,16 +422,27 @@ fn seen_at_sensors(trial: &Trial) -> bool {
 /// Whether unseen runs gain by a free dependence at the sensors' noise.
 fn dependence_at_sensors(trial: &Trial) -> bool {
     let (sum, t) = trial.at_sensors;
-    let lined_up =
-        trial.unanimous[1] && lowers_drag_s_error(trial.predicts, LINED_UP_PREDICTED_BY_DEPENDENCE);
-    sum > LEAST_GAIN_OF_DEPENDENCE_AT_SENSORS && (t > LEAST_T_OF_DEPENDENCE_AT_SENSORS || lined_up)
+    sum > LEAST_GAIN_OF_DEPENDENCE_AT_SENSORS && t > LEAST_T_OF_DEPENDENCE_AT_SENSORS
 }
 
 /// Whether a free dependence that does not stand is still to be told: noise that the sensors do not make plausible
-/// swallows it, and the drag is predicted no better with it, but all runs show it.
+/// swallows it, and the drag is predicted no better with it, but all runs show it; or few runs reach it, hardly any speaks
+/// against it, and the drag is predicted much better, or better and the gain is large.
 #[must_use]
 pub fn left_open(trial: &Trial) -> bool {
-    trial.mechanism().is_none() && !stands(trial) && dependence_at_sensors(trial)
+    let shows = |nats: f64, predicted: f64| {
+        trial.at_sensors.0 > nats && lowers_drag_s_error(trial.predicts, predicted)
+    };
+    let few_show = trial.unanimous[1]
+        && (shows(
+            LEAST_GAIN_OF_DEPENDENCE_AT_SENSORS,
+            LINED_UP_PREDICTED_BY_DEPENDENCE,
+        ) || shows(
+            LARGE_GAIN_OF_DEPENDENCE_AT_SENSORS,
+            LEAST_PREDICTED_BY_DEPENDENCE,
+        ));
+    let shown = dependence_at_sensors(trial) || few_show;
+    trial.mechanism().is_none() && !stands(trial) && shown
 }
 
 /// Whether unseen runs gain, and alike.

@@ -139,7 +139,9 @@ impl Answer<'_> {
                 .flatten()
                 .find_map(|t| match &t.claim {
                     Claim::Dependence(d)
-                        if d.variable == own.variable && d.balance == own.balance =>
+                        if d.variable == own.variable
+                            && d.balance == own.balance
+                            && d.action == own.action =>
                     {
                         Some(t.gain)
                     }
@@ -152,7 +154,10 @@ impl Answer<'_> {
             balance: Balance::Tyre.as_str(),
             // The contract's word for a fixed frequency.
             variable: "time_s".into(),
-            form: hum.finding.statement.trim_end_matches('.').to_owned(),
+            form: format!(
+                "repeats at {:.2} Hz with {:.3} {}",
+                hum.frequency_hz, hum.finding.value, hum.finding.unit
+            ),
             z: finite_or_zero(hum.finding.value / hum.finding.std),
             share: hum.share.clamp(0.0, 1.0),
         });

@@ -42,7 +42,7 @@ enum Shape {
     Hats {
         /// Their knots.
         knots: Vec<f64>,
-        /// The knot at which a dependence of friction is one: the law's own peak friction holds there. The fullest one.
+        /// The knot at which a dependence of the law is nothing: its own parameters hold there. The fullest one.
         reference: Option<usize>,
     },
     /// A wave once a turn of the wheel, for each run from an angle of its own: where the wheel stood at the start is not
@@ -80,11 +80,14 @@ fn knots(data: &Data, values: &[Vec<f64>], balance: Balance, count: usize) -> Ve
     }
 }
 
-/// The knot that most samples are about: beside one that nothing is known of, the law could be anything.
-fn fullest(data: &Data, values: &[Vec<f64>], balance: Balance, knots: &[f64]) -> usize {
+/// The knot that most samples of the tyre's balance are about: beside one that nothing is known of, the law could be
+/// anything. Along the slip a wheel that stands says nothing.
+fn fullest(data: &Data, values: &[Vec<f64>], action: Action, knots: &[f64]) -> usize {
+    let along_slip = matches!(action, Action::CriticalSlip | Action::Slip);
     let mut about = vec![0.0; knots.len()];
     for (s, u) in data.series.iter().zip(values) {
-        for k in s.segments(balance).iter().flat_map(Clone::clone) {
+        let used = s.segments(Balance::Tyre).iter().flat_map(Clone::clone);
+        for k in used.filter(|k| s.rolling[*k] || !along_slip) {
             if let Some((at, w)) = hat(knots, u[k]) {
                 about[at] += 1.0 - w;
                 if let Some(next) = about.get_mut(at + 1) {
@@ -138,7 +141,7 @@ fn on(data: &Data, variable: &Variable) -> Vec<Dependence> {
             .flat_map(|a| shapes.iter().map(move |k| (a, k)))
         {
             let reference =
-                (action != Action::Force).then(|| fullest(data, &values, balance, knots));
+                (action != Action::Force).then(|| fullest(data, &values, action, knots));
             out.push(Dependence {
                 balance,
                 variable: variable.clone(),
@@ -170,7 +173,8 @@ fn wave(data: &Data, balance: Balance, angles: &Arc<Vec<Vec<f64>>>) -> Option<De
 }
 
 /// How a variable acts along the slip, if it may: what changes the tyre moves its peak, and a speed may be read wrongly.
-/// Over slip itself that is another curve, which friction by slip says already.
+/// Over slip itself, or what goes with it, that is another curve, which friction by slip says already; distance says here
+/// what time says.
 fn along_slip(variable: &Variable) -> Option<Action> {
     match variable {
         Variable::NormalForce | Variable::Time | Variable::Column(_) => Some(Action::CriticalSlip),

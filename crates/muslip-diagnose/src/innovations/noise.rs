@@ -9,7 +9,7 @@ use super::whiten::{Course, DIFFUSE, Kind, MOST, Part, Sizes};
 use crate::audit::colour::Colour;
 use crate::data::Data;
 use crate::mechanism::Balance;
-use crate::model::{Model, friction};
+use crate::model::{Model, friction_about};
 use crate::number::finite_or_zero;
 use crate::series::Series;
 use crate::slip;
@@ -70,9 +70,6 @@ pub struct Slopes {
     pub curvature: Vec<Vec<f64>>,
 }
 
-/// Step of a curve's derivatives, in critical slips.
-const CURVE_STEP: f64 = 1e-3;
-
 impl Slopes {
     /// On the curve of a model, its law with all that its terms make of it.
     #[must_use]
@@ -99,10 +96,8 @@ impl Slopes {
 
     /// On one run, in the order of the fields.
     fn of_run(data: &Data, model: &Model, p: &[f64], s: &Series) -> [Vec<f64>; 5] {
-        let step = CURVE_STEP * model.base[1].exp();
-        let [before, here, after] = [-step, 0.0, step].map(|beyond| {
-            friction::<f64>(&data.catalogue, model, p, s, &data.context, beyond).friction
-        });
+        let ([before, here, after], step) =
+            friction_about(&data.catalogue, model, p, s, &data.context);
         let mut all = [(); 5].map(|()| Vec::with_capacity(s.len()));
         for k in 0..s.len() {
             let (v, omega, load) = (s.speed.smooth[k], s.wheel.smooth[k], s.load.smooth[k]);

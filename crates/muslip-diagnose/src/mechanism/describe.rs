@@ -168,9 +168,9 @@ pub struct Facts {
     pub amplitude: Option<usize>,
     /// Whether it scales a level that is recorded, which is made of its slow part while names are decided on.
     pub scales_level: bool,
-    /// Whether this form is what the mechanism is mistaken for, and never named: what says clearly more in it is not the
-    /// mechanism.
-    pub rival: bool,
+    /// Whether this form is of what the mechanism is mistaken for, and never named: where it says clearly more, the mechanism
+    /// is refuted.
+    pub counter_form: bool,
     /// Whether it is rare beside what recordings hardly tell it from.
     pub rare: bool,
     /// Whether a measuring chain leaves what looks like it: kernels that differ, slip's noise that flattens the curve, the
@@ -194,7 +194,7 @@ impl Facts {
             late: None,
             drawn_over: Against::Time,
             amplitude: Some(0),
-            rival: false,
+            counter_form: false,
             scales_level: false,
             rare: false,
             fed_by_chain: false,

@@ -89,7 +89,7 @@ impl Describe for SlipHysteresis {
         Facts {
             form,
             amplitude,
-            rival: self.form == Form::Rate,
+            counter_form: self.form == Form::Rate,
             ..Facts::of(Id::SlipHysteresis, stage, equation)
         }
     }

@@ -367,7 +367,7 @@ pub fn correction(correction: &Correction) -> Option<Figure> {
         "friction" => ("friction", "relative change of friction"),
         "force" => ("drag", "added force / mean normal force"),
         "critical_slip" => ("critical slip", "relative change of critical slip"),
-        "slip" => ("slip that is read", "added slip"),
+        "slip" => ("slip as read", "added slip"),
         _ => return None,
     };
     let points: Vec<(f64, f64)> = correction
