@@ -115,12 +115,12 @@ impl Levers {
                 if series.rolling[k] { slope } else { 0.0 }
             };
             let slip: Vec<f64> = (0..state.slip.len()).map(by_slip).collect();
-            let by_critical = slip
+            let critical = slip
                 .iter()
                 .zip(&state.slip)
-                .map(|(by_slip, slip)| -by_slip * slip);
-            let force = state.contact.clone().unwrap_or_else(|| state.force.clone());
-            [force, by_critical.collect(), slip]
+                .map(|(by_slip, slip)| -by_slip * slip)
+                .collect();
+            [state.contact.unwrap_or(state.force), critical, slip]
         };
         let mut levers = Self {
             force: Vec::new(),

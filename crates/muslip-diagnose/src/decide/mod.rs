@@ -284,12 +284,12 @@ fn refuted(data: &Data, trials: &[Trial]) -> Vec<Id> {
             own.then(|| (id, t.weight()))
         })
     };
-    let most = |id: Id, counter: bool| {
-        let own = weights(counter).filter(|own| own.0 == id);
+    let most = |id: Id| {
+        let own = weights(false).filter(|own| own.0 == id);
         own.map(|own| own.1).fold(f64::NEG_INFINITY, f64::max)
     };
     weights(true)
-        .filter(|&(id, weight)| weight - most(id, false) > softness(weight))
+        .filter(|&(id, weight)| weight - most(id) > softness(weight))
         .map(|own| own.0)
         .collect()
 }
