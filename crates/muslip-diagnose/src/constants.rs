@@ -147,6 +147,9 @@ pub const LOG_SIZE_STD_BEYOND: f64 = 0.8;
 pub const UNREAD_SHARE_OF_RANGE: f64 = 0.3;
 /// Least gain of the rig file's law over no force at all, nats, where a drag says anything of friction.
 pub const LEAST_GAIN_OF_LAW: f64 = 60.0;
+/// Largest friction, as a share of the rig file's peak, up to which recordings are said to hold no braking: the law is a
+/// straight line there, from which neither its peak nor its slip can be read.
+pub const LEAST_BRAKING: f64 = 0.3;
 /// Least share of samples that only repeat the one before in a channel that is held.
 pub const LEAST_REPEATED: f64 = 0.4;
 

@@ -13,6 +13,7 @@ use crate::mechanism::{Balance, Before, Context, Id, Mechanism, catalogue};
 use crate::number::{Dual, Number};
 use crate::prepare::{MOST_REACH, prepare};
 use crate::series::{DataFault, LawProducts, Series};
+use crate::slip::brakes;
 use crate::smooth::median_in_place;
 
 /// Greatest width of the dual numbers: most parameters differentiated in one pass.
@@ -142,9 +143,19 @@ fn slip_noise_share(series: &[Series], context: &Context) -> f64 {
 /// Smallest noise of a drag, as a share of its root mean square.
 const LEAST_NOISE: f64 = 1e-3;
 
-/// Whether the drag follows the rig file's law, at whatever peak, better than none: a run without braking has nothing
-/// to fit a law to.
+/// Whether something brakes, and the drag follows the rig file's law, at whatever peak, better than none: a run without
+/// braking has nothing to fit a law to.
 fn speaks_of_friction(series: &[Series], context: &Context) -> bool {
+    let of = |s: &Series| -> Vec<f64> {
+        let samples = s.tyre.iter().flat_map(Clone::clone);
+        let samples = samples.filter(|&k| s.rolling[k]);
+        samples
+            .map(|k| s.drag_smooth[k] / s.load.smooth[k])
+            .collect()
+    };
+    if !brakes(series.iter().flat_map(of).collect(), context.nominal[0]) {
+        return false;
+    }
     let LawProducts { xx, xy, yy, count } =
         LawProducts::of(series, context.radius, context.nominal[1]);
     let least = LEAST_NOISE.powi(2) * yy / count;

@@ -194,6 +194,7 @@ pub fn prepare(
         brake: brake_ok,
     };
     classify(&mut series, rig);
+    faults.extend(too_slow(&series));
     form_balances(&mut series, rig, &sound, &breaks);
     series.distance = travelled(&series.speed.smooth, &dt);
     series.angle = travelled(&series.wheel.smooth, &dt);
@@ -300,6 +301,21 @@ fn classify(series: &mut Series, rig: &Rig) {
     };
     let samples = 0..series.time.len();
     (series.still, series.rolling) = samples.map(|k| (still(k), rolling(k))).unzip();
+}
+
+/// A run that moves but never fast enough for a slip.
+fn too_slow(series: &Series) -> Option<DataFault> {
+    let speeds = series.speed.smooth.iter().copied();
+    let fastest = speeds.filter(|v| v.is_finite()).fold(0.0, f64::max);
+    (fastest > 0.0 && fastest < MIN_SPEED).then(|| DataFault {
+        recording: series.name.clone(),
+        channel: "vehicle_speed_m_s".to_owned(),
+        start_s: series.time.first().copied().unwrap_or(0.0),
+        end_s: series.time.last().copied().unwrap_or(0.0),
+        what: format!(
+            "never faster than {fastest:.1e} m/s: below {MIN_SPEED} m/s a slip says nothing"
+        ),
+    })
 }
 
 /// Whether each sample of a channel may be used.

@@ -1,5 +1,6 @@
 //! The slip of a wheel, and how it changes with what it is made of.
 
+use crate::constants::LEAST_BRAKING;
 use crate::number::Number;
 
 /// Slip of a wheel of rolling radius `radius` in m that turns at `wheel_speed` in rad/s under a vehicle at
@@ -20,6 +21,17 @@ pub fn rate(radius: f64, speeds: [f64; 2], rates: [f64; 2]) -> f64 {
     by_wheel * rates[0] + by_vehicle * rates[1]
 }
 
+/// Whether friction, drag over load at each sample, rises so far towards the rig file's peak that something brakes.
+pub fn brakes(mut friction: Vec<f64>, peak: f64) -> bool {
+    friction.retain(|f| f.is_finite());
+    if friction.is_empty() {
+        return false;
+    }
+    // What one sample of a thousand exceeds.
+    let at = (friction.len() - 1).min(friction.len() * 999 / 1000);
+    *friction.select_nth_unstable_by(at, f64::total_cmp).1 > LEAST_BRAKING * peak
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -35,6 +47,17 @@ mod tests {
         for (own, told) in dual.slope.iter().zip(told) {
             assert!((own - told).abs() < 1e-15, "{own} {told}");
         }
+    }
+
+    #[test]
+    fn friction_far_below_the_peak_is_no_braking() {
+        let samples =
+            |friction: f64, count: usize| [vec![friction; count], vec![0.05; 9000]].concat();
+        assert!(brakes(samples(0.5, 100), 0.9));
+        assert!(!brakes(samples(0.2, 100), 0.9));
+        // Outliers are none, either.
+        assert!(!brakes(samples(0.5, 5), 0.9));
+        assert!(!brakes(vec![f64::NAN, f64::INFINITY], 0.9) && !brakes(Vec::new(), 0.9));
     }
 
     #[test]

@@ -135,3 +135,13 @@ pub const ZERO_SHARE: f64 = 0.25;
 pub const ZERO_ALONE_SIGMAS: f64 = 5.0;
 /// Factor on what the law's zero is said to be uncertain by: the law's form is only nearly a tyre's.
 pub const ZERO_LAW_FACTOR: f64 = 2.0;
+/// Share of the drag's squares that the rig file's law explains, at whatever peak, from which the drag speaks of slip.
+pub const DRAG_OF_SLIP: f64 = 0.5;
+/// A wheel rolls where the ratio of its speeds is so near to the run's median.
+pub const ROLLING_NEAR: f64 = 0.15;
+/// Longest stretch that has a radius of its own, s: the slip of a wheel that drives goes with road and wind.
+pub const LONGEST_ROLLING_S: f64 = 8.0;
+/// Share of what moves in the vehicle speed that the wheel's must explain to be a clock of it.
+pub const ROLLING_EXPLAINED: f64 = 0.5;
+/// Least scale of a speed that is told: by half a percent a tyre's radius changes with load and pressure.
+pub const LEAST_SCALE: f64 = 0.005;

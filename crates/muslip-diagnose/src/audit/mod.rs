@@ -3,6 +3,7 @@
 //! | question | module |
 //! | --- | --- |
 //! | when each channel tells what happened | [`timing`]: [`vehicle`], [`wheel`], [`law`], all by [`squares`] |
+//! | what rolling wheels tell of both speeds | [`mod@rolling`] |
 //! | what is held, what moves in steps | [`hold`], [`steps`], [`simple`] |
 //! | what was measured at other times than the recording's | [`resampled`] |
 //! | narrow lines: hum, ripple | [`mod@hum`], [`mod@line`] |
@@ -27,6 +28,7 @@ pub mod leak;
 pub mod line;
 pub mod recording;
 pub mod resampled;
+pub mod rolling;
 pub mod signal;
 pub mod simple;
 pub mod squares;
@@ -185,6 +187,9 @@ pub fn audit(rig: &Rig, runs: &[Run]) -> Audit {
         .find_map(|run| run.brake.as_ref())
         .map_or("", |(name, _)| name);
     let mut findings = timing::findings(&timings, brake);
+    if let Some(rolling) = &timings.rolling {
+        findings.extend(rolling::findings(rig, &recordings, rolling));
+    }
     findings.extend(simple::simple(runs, &recordings));
     let hum = hum::hum(&recordings);
     findings.extend(hum.iter().map(|hum| hum.finding.clone()));

@@ -1,16 +1,19 @@
 //! Which speed is late, and by how much, from all balances.
 
 use super::constants::{
-    FORM_S, FORM_SHARE, LEAST_DELAY_S, SPREAD_FACTOR, STEP_SHARE, TOLD_SIGMAS, UNKNOWN_DELAY_S,
+    DRAG_OF_SLIP, FORM_S, FORM_SHARE, LEAST_DELAY_S, SPREAD_FACTOR, STEP_SHARE, TOLD_SIGMAS,
+    UNKNOWN_DELAY_S,
 };
 use super::finding::{Finding, Timing, Word};
 use super::hold::Hold;
 use super::law;
 use super::recording::Recording;
+use super::rolling::{Rolling, rolling};
 use super::squares::Solution;
 use super::vehicle::vehicle;
 use super::wheel::wheel;
 use crate::campaign::Rig;
+use crate::slip::{brakes, slip};
 use crate::smooth::median_in_place;
 
 /// Delays against the drag, and by what filter channels are slower than it.
@@ -24,6 +27,8 @@ pub struct Timings {
     pub brake: Timing,
     /// Second moment by which the vehicle speed is slower than the drag, s², and its standard deviation.
     pub vehicle_moment: Option<(f64, f64)>,
+    /// What the speeds say where nothing brakes.
+    pub rolling: Option<Rolling>,
     /// What the law says of a filter of the drag.
     pub drag_pole: Option<law::Pole>,
     /// What each balance said, for a closer look: vehicle, wheel, law.
@@ -61,6 +66,24 @@ fn waiting(run: &Recording, hold: Option<Hold>) -> f64 {
     hold.map_or(0.0, |hold| 0.5 * (hold.period_s - run.step))
 }
 
+/// Whether the tyre's law is a clock: the wheel is braked or driven hard, and the drag is mostly what the rig file's law makes
+/// of slip, be its sign the other one.
+fn speaks_of_slip(rig: &Rig, runs: &[Recording]) -> bool {
+    let mut friction = Vec::new();
+    let (mut xx, mut xy, mut yy) = (0.0, 0.0, 0.0);
+    for run in runs {
+        for k in run.moving.iter().flat_map(Clone::clone) {
+            let (drag, load) = (run.drag.clean[k], run.load.clean[k]);
+            let slip = slip(rig.radius_m, run.wheel.clean[k], run.speed.clean[k]);
+            let u = slip / rig.critical_slip;
+            let law = load * 2.0 * u / (1.0 + u * u);
+            friction.push((drag / load).abs());
+            (xx, xy, yy) = (xx + law * law, xy + law * drag, yy + drag * drag);
+        }
+    }
+    brakes(friction, rig.peak_friction) && xy * xy > DRAG_OF_SLIP * xx * yy
+}
+
 /// All delays.
 #[must_use]
 pub fn timings(rig: &Rig, runs: &[Recording]) -> Timings {
@@ -80,7 +103,9 @@ pub fn timings(rig: &Rig, runs: &[Recording]) -> Timings {
         ..out.vehicle
     };
     let moment = out.vehicle_moment.map_or(0.0, |m| m.0);
-    if let Some(law::Told { estimate, pole }) = law::law(rig, runs, known, moment) {
+    if !speaks_of_slip(rig, runs) {
+        out.rolling = Some(rolling(rig, runs));
+    } else if let Some(law::Told { estimate, pole }) = law::law(rig, runs, known, moment) {
         out.drag_pole = pole;
         out.wheel = out
             .wheel
