@@ -96,6 +96,24 @@ impl Audit {
         run
     }
 
+    /// Whether the channels show that they come through a chain: what no effect that a simulation lacks makes of them.
+    #[must_use]
+    pub fn shows_a_chain(&self) -> bool {
+        let mut words = self.findings.iter().map(|found| found.finding);
+        words.any(|word| {
+            matches!(
+                word,
+                Word::ColouredNoise
+                    | Word::CommonNoise
+                    | Word::Quantised
+                    | Word::Held
+                    | Word::Hum
+                    | Word::Ripple
+                    | Word::Clock
+            )
+        })
+    }
+
     /// Whether the vehicle speed passes a filter slower than the other channels'.
     #[must_use]
     pub fn vehicle_filtered(&self) -> bool {

@@ -52,8 +52,9 @@ impl Timing {
 
     /// How late the drag is, in s, where a speed and all other channels are early, and alike: by what all of them are,
     /// for what one is early by beyond that is its own. Beside a wheel's speed and a brake that are, a vehicle's that is
-    /// late says nothing against it: its receiver is.
-    fn drag_late(&self) -> Option<f64> {
+    /// late says nothing against it: its receiver is. Where one alone is known, it may as well be early by itself, its logger
+    /// ahead, if the channels have come through a chain that shows.
+    fn drag_late(&self, chain_shows: bool) -> Option<f64> {
         let known = |l: &&Late| l.std < VAGUE_S;
         let early = |l: &Late| known(&l) && l.value < 0.0;
         let late_receiver = early(&self.wheel) && early(&self.brake) && !early(&self.vehicle);
@@ -66,6 +67,9 @@ impl Timing {
         let alike =
             |l: &Late| (-l.value - late).abs() < ALIKE_LATE * late + ALIKE_LATE_S + 2.0 * l.std;
         let heard = |l: &&Late| l.std < HEARD_S;
+        if chain_shows && all.iter().filter(known).count() < 2 {
+            return None;
+        }
         (speed && late > LEAST_DRAG_LATE_S && asked.iter().filter(heard).all(alike)).then_some(late)
     }
 
@@ -125,9 +129,9 @@ impl Timing {
 
     /// Leaves the drag as late, and the brake as early, as they are to be explained, or as another's timing did; by how
     /// much the drag, and whether the brake.
-    fn leave_to_physics(&mut self, other: Option<&Self>) -> (Option<f64>, bool) {
+    fn leave_to_physics(&mut self, other: Option<&Self>, chain_shows: bool) -> (Option<f64>, bool) {
         let drag = other.map_or_else(
-            || self.drag_late(),
+            || self.drag_late(chain_shows),
             |other| (other.drag > 0.0).then_some(other.drag),
         );
         self.leave(drag.unwrap_or(0.0));
@@ -268,7 +272,7 @@ impl Recorded<'_> {
     ) -> Option<(Data, Timing, Judged)> {
         timing.found = timing.late;
         timing.brake_heard = self.audit.brake_late.std.is_finite();
-        let (drag, brake) = timing.leave_to_physics(start);
+        let (drag, brake) = timing.leave_to_physics(start, self.audit.shows_a_chain());
         if drag.is_some() || brake {
             data = self.at_one_time(timing.late);
             // What is to be explained is not to be explained away: a drag that two others say is late, or a brake.
@@ -498,33 +502,44 @@ mod tests {
 
     #[test]
     fn a_drag_that_all_channels_precede_alike_is_late_by_what_all_of_them_are_early() {
-        let late = timing(-0.010, -0.011, -0.010).drag_late();
+        let late = timing(-0.010, -0.011, -0.010).drag_late(false);
         assert!((late.unwrap() - 0.010).abs() < 1e-12);
-        assert_eq!(timing(0.010, 0.011, 0.010).drag_late(), None);
+        assert_eq!(timing(0.010, 0.011, 0.010).drag_late(false), None);
         // Each logger out of step by its own: what the others are early by beyond the wheel is theirs.
-        assert_eq!(timing(-0.010, -0.013, -0.014).drag_late(), Some(0.010));
-        assert_eq!(timing(-0.010, -0.018, -0.019).drag_late(), None);
+        assert_eq!(timing(-0.010, -0.013, -0.014).drag_late(false), Some(0.010));
+        assert_eq!(timing(-0.010, -0.018, -0.019).drag_late(false), None);
     }
 
     #[test]
     fn a_vehicle_speed_that_is_late_speaks_against_a_late_drag_however_vague() {
         let mut no_brake = timing(-0.013, 0.032, 0.0);
         (no_brake.vehicle.std, no_brake.brake.std) = (0.003, 0.02);
-        assert_eq!(no_brake.drag_late(), None);
+        assert_eq!(no_brake.drag_late(false), None);
         // As vague as this it says nothing.
         no_brake.vehicle.std = 0.03;
-        assert_eq!(no_brake.drag_late(), Some(0.013));
+        assert_eq!(no_brake.drag_late(false), Some(0.013));
+    }
+
+    #[test]
+    fn a_wheel_that_is_early_alone_may_be_so_by_itself_where_a_chain_shows() {
+        let mut alone = timing(-0.010, 0.0, 0.0);
+        (alone.vehicle.std, alone.brake.std) = (0.03, f64::INFINITY);
+        assert_eq!(alone.drag_late(false), Some(0.010));
+        assert_eq!(alone.drag_late(true), None);
+        // A brake that is early as well bears it out.
+        (alone.brake.value, alone.brake.std) = (-0.010, 3e-4);
+        assert_eq!(alone.drag_late(true), Some(0.010));
     }
 
     #[test]
     fn a_late_receiver_says_nothing_against_a_late_drag() {
-        assert_eq!(timing(-0.010, 0.030, -0.011).drag_late(), Some(0.010));
+        assert_eq!(timing(-0.010, 0.030, -0.011).drag_late(false), Some(0.010));
         // A filter of the drag's that the brake has, too.
-        assert_eq!(timing(-0.010, 0.030, 0.000).drag_late(), None);
-        assert_eq!(timing(0.004, 0.030, -0.011).drag_late(), None);
+        assert_eq!(timing(-0.010, 0.030, 0.000).drag_late(false), None);
+        assert_eq!(timing(0.004, 0.030, -0.011).drag_late(false), None);
         let mut no_brake = timing(-0.010, 0.030, 0.0);
         no_brake.brake.std = 0.02;
-        assert_eq!(no_brake.drag_late(), None);
+        assert_eq!(no_brake.drag_late(false), None);
     }
 
     #[test]
@@ -583,7 +598,7 @@ mod tests {
     fn a_brake_alone_that_is_read_early_says_nothing_of_the_drag() {
         let mut alone = timing(-0.02, -0.02, -0.035);
         (alone.wheel.std, alone.vehicle.std) = (0.01, f64::INFINITY);
-        assert!(alone.drag_late().is_none() && alone.brake_early());
+        assert!(alone.drag_late(false).is_none() && alone.brake_early());
     }
 
     #[test]
@@ -629,18 +644,21 @@ mod tests {
     #[test]
     fn an_argument_by_fewer_runs_leaves_what_the_one_by_all_runs_does() {
         let mut all = timing(-0.010, -0.011, -0.010);
-        assert_eq!(all.leave_to_physics(None), (Some(0.010), false));
+        assert_eq!(all.leave_to_physics(None, false), (Some(0.010), false));
         // By itself it would give this to the chain.
         let mut fewer = timing(-0.010, -0.018, -0.019);
-        assert_eq!(fewer.clone().leave_to_physics(None), (None, false));
-        assert_eq!(fewer.leave_to_physics(Some(&all)), (Some(0.010), false));
+        assert_eq!(fewer.clone().leave_to_physics(None, false), (None, false));
+        assert_eq!(
+            fewer.leave_to_physics(Some(&all), false),
+            (Some(0.010), false)
+        );
         assert!((fewer.wheel.value).abs() < 1e-12 && (fewer.vehicle.value + 0.008).abs() < 1e-12);
         // And this to the brake.
         let mut alone = timing(0.0, 0.0, -0.030);
         let mut late = timing(0.010, 0.011, 0.010);
-        assert_eq!(late.leave_to_physics(None), (None, false));
-        assert_eq!(alone.leave_to_physics(Some(&late)), (None, false));
-        assert_eq!(alone.leave_to_physics(None), (None, true));
+        assert_eq!(late.leave_to_physics(None, false), (None, false));
+        assert_eq!(alone.leave_to_physics(Some(&late), false), (None, false));
+        assert_eq!(alone.leave_to_physics(None, false), (None, true));
     }
 
     #[test]

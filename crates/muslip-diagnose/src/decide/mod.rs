@@ -470,6 +470,7 @@ mod tests {
             gain: nats,
             price: 0.0,
             unseen: (nats, t),
+            runs: 6,
             at_sensors: (nats, t),
             first: false,
             own: true,
@@ -484,6 +485,21 @@ mod tests {
             unanimous: [false, false],
             judged: base.clone().without_columns(),
         }
+    }
+
+    #[test]
+    fn a_gain_that_no_chain_leaves_needs_no_more_even_runs_than_what_chains_do_not_feed() {
+        let data = stop(Noise::TYPICAL, 4);
+        let base = toy::settled(&data);
+        // So many nats on each of six unseen runs.
+        let fed = |nats: f64, t: f64| Trial {
+            fed_by_chain: true,
+            predicts: 0.5,
+            ..of_name(&data, &base, Id::StructuralResonance, nats, t)
+        };
+        assert!(stands(&fed(60.0, 1.6)));
+        assert!(!stands(&fed(60.0, 1.4)) && !stands(&fed(40.0, 1.6)));
+        assert!(stands(&fed(40.0, 2.1)));
     }
 
     #[test]

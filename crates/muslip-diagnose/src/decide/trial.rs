@@ -3,8 +3,8 @@
 use crate::chain::timing::Untold;
 use crate::constants::{
     CLEARLY_PREDICTED, DEPENDENCE_WORTH, INDIFFERENT_NATS, LARGE_GAIN_AT_SENSORS,
-    LARGE_GAIN_OF_DEPENDENCE_AT_SENSORS, LEAST_EFFECT, LEAST_GAIN, LEAST_GAIN_AT_SENSORS,
-    LEAST_GAIN_OF_DEPENDENCE_AT_SENSORS, LEAST_MEMORY_S, LEAST_PREDICTED,
+    LARGE_GAIN_OF_DEPENDENCE_AT_SENSORS, LARGE_GAIN_ON_UNSEEN, LEAST_EFFECT, LEAST_GAIN,
+    LEAST_GAIN_AT_SENSORS, LEAST_GAIN_OF_DEPENDENCE_AT_SENSORS, LEAST_MEMORY_S, LEAST_PREDICTED,
     LEAST_PREDICTED_BY_DEPENDENCE, LEAST_T, LEAST_T_AT_SENSORS, LEAST_T_AT_SENSORS_NOT_FED,
     LEAST_T_NOT_FED, LEAST_T_OF_DEPENDENCE, LEAST_T_OF_DEPENDENCE_AT_SENSORS, LEAST_T_OF_LARGE,
     LEAST_T_OF_LIKELIER, LINED_UP_PREDICTED, LINED_UP_PREDICTED_BY_DEPENDENCE, MOST_AGAINST,
@@ -72,6 +72,8 @@ pub struct Trial {
     pub price: f64,
     /// Mean gain on unseen runs in nats, and its t over the runs.
     pub unseen: (f64, f64),
+    /// On how many unseen runs.
+    pub runs: usize,
     /// Gain on all unseen runs in nats if the noise were no larger than the sensors make plausible, and the t of the
     /// runs' gains under the root, signs kept: they are as uneven as the runs.
     pub at_sensors: (f64, f64),
@@ -290,6 +292,7 @@ impl<'a> Before<'a> {
             gain: base.loss - judged.loss - price,
             price,
             unseen: mean_and_t(&own_gains),
+            runs: own_gains.len(),
             first: !named || at_sensors.0 > self.taken_up,
             at_sensors,
             own,
@@ -451,7 +454,8 @@ fn seen_on_unseen_runs(trial: &Trial) -> bool {
     match trial.claim {
         Claim::Mechanism(..) => {
             let clearly = lowers_drag_s_error(trial.predicts, CLEARLY_PREDICTED);
-            let least = if clearly && !trial.fed_by_chain {
+            let not_fed = !trial.fed_by_chain || mean * trial.runs as f64 > LARGE_GAIN_ON_UNSEEN;
+            let least = if clearly && not_fed {
                 LEAST_T_NOT_FED
             } else {
                 LEAST_T
