@@ -163,16 +163,16 @@ fn speaks_of_friction(series: &[Series], context: &Context) -> bool {
     xy > 0.0 && xy * xy / xx > 2.0 * LEAST_GAIN_OF_LAW * noise
 }
 
-/// Takes the tyre balance from a run, and says why.
-fn silenced(series: &mut Series) -> DataFault {
+/// Takes the tyre balance from a run, and says why where that is not that its wheel never rolls.
+fn silenced(series: &mut Series) -> Option<DataFault> {
     series.tyre.clear();
-    DataFault {
+    series.rolling.contains(&true).then(|| DataFault {
         recording: series.name.clone(),
         channel: "drag_force_n".to_owned(),
         start_s: series.time.first().copied().unwrap_or(0.0),
         end_s: series.time.last().copied().unwrap_or(0.0),
         what: "drag that says nothing of friction: no braking in the recordings".to_owned(),
-    }
+    })
 }
 
 /// Mean over samples that pass a filter; `fallback` if there are none.
@@ -279,7 +279,7 @@ impl Data {
             ..Self::context_of(rig, &series)
         };
         if series.iter().any(|s| !s.tyre.is_empty()) && !speaks_of_friction(&series, &context) {
-            faults.extend(series.iter_mut().map(silenced));
+            faults.extend(series.iter_mut().filter_map(silenced));
         }
         Self {
             extra_names: extra_names.to_vec(),
