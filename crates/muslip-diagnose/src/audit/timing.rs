@@ -104,7 +104,10 @@ pub fn timings(rig: &Rig, runs: &[Recording]) -> Timings {
     };
     let moment = out.vehicle_moment.map_or(0.0, |m| m.0);
     if !speaks_of_slip(rig, runs) {
-        out.rolling = Some(rolling(rig, runs));
+        let mut rolling = rolling(rig, runs);
+        // What is held waits, as with the others.
+        rolling.vehicle_late.value += held_speed - held_wheel;
+        out.rolling = Some(rolling);
     } else if let Some(law::Told { estimate, pole }) = law::law(rig, runs, known, moment) {
         out.drag_pole = pole;
         out.wheel = out
