@@ -10,7 +10,7 @@ use crate::chain::correct::TimingStd;
 use crate::constants::LEAST_GAIN_OF_LAW;
 use crate::innovations::blocks::Blocks;
 use crate::mechanism::{Balance, Before, Context, Id, Mechanism, catalogue};
-use crate::number::{Dual, Number};
+use crate::number::{Dual, Number, largest_but_for_outliers};
 use crate::prepare::{MOST_REACH, prepare};
 use crate::series::{DataFault, LawProducts, Series};
 use crate::slip::brakes;
@@ -203,16 +203,8 @@ fn span(s: &Series) -> f64 {
 
 /// The drag in N that one sample of a thousand exceeds.
 fn largest_drag(series: &[Series]) -> f64 {
-    let mut drags: Vec<f64> = series
-        .iter()
-        .flat_map(|s| s.drag_smooth.iter().copied())
-        .filter(|d| d.is_finite())
-        .collect();
-    if drags.is_empty() {
-        return 1.0;
-    }
-    let at = (drags.len() - 1).min(drags.len() * 999 / 1000);
-    *drags.select_nth_unstable_by(at, f64::total_cmp).1
+    let drags = series.iter().flat_map(|s| s.drag_smooth.iter().copied());
+    largest_but_for_outliers(drags.collect()).unwrap_or(1.0)
 }
 
 /// What tyre and brake have done before each run and over the whole campaign.

@@ -200,6 +200,14 @@ pub fn mean_and_std(values: &[f64]) -> (f64, f64) {
     (mean, (squares / (n - 1.0).max(1.0)).sqrt())
 }
 
+/// The value that one of a thousand exceeds, of those that are numbers; none of none.
+#[must_use]
+pub fn largest_but_for_outliers(mut values: Vec<f64>) -> Option<f64> {
+    values.retain(|x| x.is_finite());
+    let at = values.len().checked_sub(1)?.min(values.len() * 999 / 1000);
+    Some(*values.select_nth_unstable_by(at, f64::total_cmp).1)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

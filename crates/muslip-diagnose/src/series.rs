@@ -205,16 +205,20 @@ impl LawProducts {
             let used = s.tyre.iter().flat_map(Clone::clone);
             for k in used.filter(|k| s.rolling[*k]) {
                 let x = s.slip(k, radius) / critical;
-                let shape = s.load.smooth[k] * 2.0 * x / (1.0 + x * x);
-                let y = s.drag[k];
-                if shape.is_finite() && y.is_finite() {
-                    sums.xx += shape * shape;
-                    sums.xy += shape * y;
-                    sums.yy += y * y;
-                    sums.count += 1.0;
-                }
+                sums.add(s.load.smooth[k], x, s.drag[k]);
             }
         }
         sums
+    }
+
+    /// Takes in a reading of the drag in N at a load in N and a slip over that at the peak.
+    pub(crate) fn add(&mut self, load: f64, slip: f64, drag: f64) {
+        let shape = load * 2.0 * slip / (1.0 + slip * slip);
+        if shape.is_finite() && drag.is_finite() {
+            self.xx += shape * shape;
+            self.xy += shape * drag;
+            self.yy += drag * drag;
+            self.count += 1.0;
+        }
     }
 }

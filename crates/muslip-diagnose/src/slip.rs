@@ -1,7 +1,7 @@
 //! The slip of a wheel, and how it changes with what it is made of.
 
 use crate::constants::LEAST_BRAKING;
-use crate::number::Number;
+use crate::number::{Number, largest_but_for_outliers};
 
 /// Slip of a wheel of rolling radius `radius` in m that turns at `wheel_speed` in rad/s under a vehicle at
 /// `vehicle_speed` in m/s, not zero: 0 where it rolls freely, 1 where it is locked.
@@ -22,14 +22,8 @@ pub fn rate(radius: f64, speeds: [f64; 2], rates: [f64; 2]) -> f64 {
 }
 
 /// Whether friction, drag over load at each sample, rises so far towards the rig file's peak that something brakes.
-pub fn brakes(mut friction: Vec<f64>, peak: f64) -> bool {
-    friction.retain(|f| f.is_finite());
-    if friction.is_empty() {
-        return false;
-    }
-    // What one sample of a thousand exceeds.
-    let at = (friction.len() - 1).min(friction.len() * 999 / 1000);
-    *friction.select_nth_unstable_by(at, f64::total_cmp).1 > LEAST_BRAKING * peak
+pub fn brakes(friction: Vec<f64>, peak: f64) -> bool {
+    largest_but_for_outliers(friction).is_some_and(|largest| largest > LEAST_BRAKING * peak)
 }
 
 #[cfg(test)]

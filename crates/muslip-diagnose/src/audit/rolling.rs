@@ -3,18 +3,16 @@
 
 use core::ops::Range;
 
-use rayon::prelude::*;
-
 use super::constants::{
-    COARSE_STEP_S, FEWEST_BLOCKS, LEAST_DELAY_S, LEAST_SCALE, LONGEST_ROLLING_S, MOST_ROWS,
-    ROLLING_EXPLAINED, ROLLING_NEAR, SHORTEST_BLOCK_S, SPREAD_FACTOR, TOLD_SIGMAS, UNKNOWN_DELAY_S,
-    VEHICLE_RANGE_S, WHEEL_STEP_S,
+    FEWEST_BLOCKS, LEAST_DELAY_S, LEAST_SCALE, LONGEST_ROLLING_S, MOST_ROWS, ROLLING_EXPLAINED,
+    ROLLING_NEAR, SHORTEST_BLOCK_S, SPREAD_FACTOR, TOLD_SIGMAS, UNKNOWN_DELAY_S, WHEEL_STEP_S,
 };
 use super::finding::{Finding, Timing, Word};
 use super::recording::{Block, Recording, blocks};
-use super::squares::{Balance, colour_of, recoloured, refine, rest, scan_value};
+use super::squares::{Balance, best_vehicle_delay, colour_of, recoloured, refine, rest};
 use crate::campaign::Rig;
 use crate::cleaning::stretches;
+use crate::number::mean_and_std;
 use crate::smooth::median_in_place;
 
 /// What wheels that roll say.
@@ -110,26 +108,14 @@ fn rolls(run: &Recording) -> Vec<Range<usize>> {
 /// By how much a run's vehicle speed is later. Slip that a driving wheel has goes slowly, noise quickly: both are weighed by
 /// what the difference of the speeds looks like where it is least.
 fn late(speeds: &Speeds<'_>) -> Option<Value> {
-    let plain = best_of_scan(speeds, &[])?;
+    let one = |delay: f64| vec![delay];
+    let plain = best_vehicle_delay(speeds, one, &[])?;
     let colour = colour_of(speeds, &[plain]);
-    let best = best_of_scan(speeds, &colour)?;
+    let best = best_vehicle_delay(speeds, one, &colour)?;
     let at = refine(speeds, &[best], &colour, 4, &[false])?;
     let estimate = recoloured(speeds, at, &[false])?;
     let (value, std) = (estimate.unknowns[0], SPREAD_FACTOR * estimate.std[0]);
     (std < UNKNOWN_DELAY_S && speeds.explained(value) > ROLLING_EXPLAINED).then_some((value, std))
-}
-
-/// The delay of a scan that leaves least.
-fn best_of_scan(speeds: &Speeds<'_>, colour: &[f64]) -> Option<f64> {
-    let count = ((VEHICLE_RANGE_S.1 - VEHICLE_RANGE_S.0) / COARSE_STEP_S).round() as usize;
-    let scanned: Vec<Value> = (0..=count)
-        .into_par_iter()
-        .map(|k| VEHICLE_RANGE_S.0 + k as f64 * COARSE_STEP_S)
-        .map(|delay| (scan_value(speeds, &[delay], colour), delay))
-        .filter(|(value, _)| value.is_finite())
-        .collect();
-    let best = scanned.iter().min_by(|a, b| a.0.total_cmp(&b.0))?;
-    Some(best.1)
 }
 
 /// Vehicle speed over radius times wheel speed: the median of a run, and its standard deviation by those of its pieces.
@@ -144,10 +130,7 @@ fn ratio(rig: &Rig, run: &Recording) -> Option<Value> {
     let medians: Vec<f64> = pieces
         .map(|piece| median_in_place(&mut piece.to_vec()))
         .collect();
-    let count = medians.len() as f64;
-    let mean = medians.iter().sum::<f64>() / count;
-    let square: f64 = medians.iter().map(|m| (m - mean).powi(2)).sum();
-    let std = SPREAD_FACTOR * (square / (count * (count - 1.0))).sqrt();
+    let std = SPREAD_FACTOR * mean_and_std(&medians).1 / (medians.len() as f64).sqrt();
     Some((median_in_place(&mut ratios), std))
 }
 

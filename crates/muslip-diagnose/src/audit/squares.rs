@@ -4,7 +4,7 @@
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-use super::constants::WHITENING_ORDER;
+use super::constants::{COARSE_STEP_S, VEHICLE_RANGE_S, WHITENING_ORDER};
 
 /// A balance whose residual depends on a few unknowns.
 pub trait Balance: Sync {
@@ -171,6 +171,25 @@ fn sum_of(white: &[Vec<f64>]) -> f64 {
 pub fn scan_value(balance: &impl Balance, unknowns: &[f64], coefficients: &[f64]) -> f64 {
     let whitener = Whitener::new(coefficients.to_vec(), &balance.own(unknowns));
     sum_of(&whitener.apply(&balance.residual(unknowns)))
+}
+
+/// Of the delays that a vehicle speed may have, the one at which a balance leaves least, its unknowns as given for each.
+#[must_use]
+pub fn best_vehicle_delay(
+    balance: &impl Balance,
+    unknowns: impl Fn(f64) -> Vec<f64> + Sync,
+    coefficients: &[f64],
+) -> Option<f64> {
+    let (first, last) = VEHICLE_RANGE_S;
+    let count = ((last - first) / COARSE_STEP_S).round() as usize;
+    let scanned: Vec<(f64, f64)> = (0..=count)
+        .into_par_iter()
+        .map(|k| first + k as f64 * COARSE_STEP_S)
+        .map(|delay| (scan_value(balance, &unknowns(delay), coefficients), delay))
+        .filter(|(value, _)| value.is_finite())
+        .collect();
+    let best = scanned.iter().min_by(|a, b| a.0.total_cmp(&b.0))?;
+    Some(best.1)
 }
 
 /// Residuals at the unknowns, each stretch's own columns taken out.

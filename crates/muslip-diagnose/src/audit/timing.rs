@@ -13,6 +13,7 @@ use super::squares::Solution;
 use super::vehicle::vehicle;
 use super::wheel::wheel;
 use crate::campaign::Rig;
+use crate::series::LawProducts;
 use crate::slip::{brakes, slip};
 use crate::smooth::median_in_place;
 
@@ -70,17 +71,16 @@ fn waiting(run: &Recording, hold: Option<Hold>) -> f64 {
 /// of slip, be its sign the other one.
 fn speaks_of_slip(rig: &Rig, runs: &[Recording]) -> bool {
     let mut friction = Vec::new();
-    let (mut xx, mut xy, mut yy) = (0.0, 0.0, 0.0);
+    let mut sums = LawProducts::default();
     for run in runs {
         for k in run.moving.iter().flat_map(Clone::clone) {
             let (drag, load) = (run.drag.clean[k], run.load.clean[k]);
             let slip = slip(rig.radius_m, run.wheel.clean[k], run.speed.clean[k]);
-            let u = slip / rig.critical_slip;
-            let law = load * 2.0 * u / (1.0 + u * u);
             friction.push((drag / load).abs());
-            (xx, xy, yy) = (xx + law * law, xy + law * drag, yy + drag * drag);
+            sums.add(load, slip / rig.critical_slip, drag);
         }
     }
+    let LawProducts { xx, xy, yy, .. } = sums;
     brakes(friction, rig.peak_friction) && xy * xy > DRAG_OF_SLIP * xx * yy
 }
 

@@ -1,12 +1,8 @@
 //! The vehicle's balance in level form: v(t) against the drag's impulse, and what it says of the vehicle speed's delay.
 
-use rayon::prelude::*;
-
-use super::constants::{
-    COARSE_STEP_S, FEWEST_BLOCKS, MOST_ROWS, SHORTEST_BLOCK_S, VEHICLE_RANGE_S, VEHICLE_STEP_S,
-};
+use super::constants::{FEWEST_BLOCKS, MOST_ROWS, SHORTEST_BLOCK_S, VEHICLE_STEP_S};
 use super::recording::{Block, Recording, blocks, spans};
-use super::squares::{Balance, Solution, recoloured, refine, scan_value};
+use super::squares::{Balance, Solution, best_vehicle_delay, recoloured, refine};
 
 /// Unknowns: scale of the drag's impulse, delay in s, and second moment by which v is slower, s². The speed itself is never
 /// filtered: that would only take its noise away.
@@ -140,17 +136,8 @@ pub fn vehicle(runs: &[Recording], mass: f64) -> Option<Solution> {
         return None;
     }
     // Coarsely: differences, and the scale as it comes.
-    let count = ((VEHICLE_RANGE_S.1 - VEHICLE_RANGE_S.0) / COARSE_STEP_S).round() as usize;
-    let scanned: Vec<(f64, f64)> = (0..=count)
-        .into_par_iter()
-        .filter_map(|k| {
-            let delay = VEHICLE_RANGE_S.0 + k as f64 * COARSE_STEP_S;
-            let value = scan_value(&balance, &[1.0, delay, 0.0], &[0.95]);
-            value.is_finite().then_some((value, delay))
-        })
-        .collect();
-    let best = scanned.iter().min_by(|a, b| a.0.total_cmp(&b.0))?;
-    let start = [1.0, best.1, 0.0];
+    let from = |delay: f64| vec![1.0, delay, 0.0];
+    let start = from(best_vehicle_delay(&balance, from, &[0.95])?);
     let at = refine(&balance, &start, &[0.95], 4, &[false, false, true])?;
     recoloured(&balance, at, &[false; 3])
 }
