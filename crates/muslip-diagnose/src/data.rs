@@ -11,7 +11,7 @@ use crate::constants::LEAST_GAIN_OF_LAW;
 use crate::innovations::blocks::Blocks;
 use crate::mechanism::{Balance, Before, Context, Id, Mechanism, catalogue};
 use crate::number::{Dual, Number, largest_but_for_outliers};
-use crate::prepare::{MOST_REACH, prepare};
+use crate::prepare::{REACH_FACTORS, prepare};
 use crate::series::{DataFault, LawProducts, Series};
 use crate::slip::brakes;
 use crate::smooth::median_in_place;
@@ -235,9 +235,23 @@ impl Data {
         }
     }
 
-    /// Prepares all runs of a campaign.
+    /// Prepares all runs of a campaign for an argument about what is missing. Noise that is left in the slip looks like
+    /// physics: where it is a good part of the residual, the windows of smoothing are widened.
     #[must_use]
     pub fn new(rig: &Rig, runs: &[Run]) -> Self {
+        let narrow = Self::smoothed(rig, runs, REACH_FACTORS[0]);
+        REACH_FACTORS[1..].iter().fold(narrow, |data, wider| {
+            if data.slip_noise_share() > SLIP_NOISE_SHARE {
+                Self::smoothed(rig, runs, *wider)
+            } else {
+                data
+            }
+        })
+    }
+
+    /// Prepares all runs of a campaign with windows of smoothing that are so many times as wide.
+    #[must_use]
+    pub fn smoothed(rig: &Rig, runs: &[Run], reach_factor: f64) -> Self {
         let mut extra_names: Vec<String> = Vec::new();
         for run in runs {
             for (column, _) in &run.extra {
@@ -246,23 +260,10 @@ impl Data {
                 }
             }
         }
-        let mut reach_factor = 1.0;
-        loop {
-            let data = Self::prepared(rig, runs, &extra_names, reach_factor);
-            // Noise that is left in the slip looks like physics: where it is a good part of the residual, wider
-            // windows cost less than they save.
-            if reach_factor >= MOST_REACH || data.slip_noise_share() <= SLIP_NOISE_SHARE {
-                return data;
-            }
-            reach_factor *= 2.0;
-        }
-    }
-
-    fn prepared(rig: &Rig, runs: &[Run], extra_names: &[String], reach_factor: f64) -> Self {
         let prepared: Vec<(Series, Vec<DataFault>)> = runs
             .par_iter()
             .enumerate()
-            .map(|(index, run)| prepare(rig, run, extra_names, index, reach_factor))
+            .map(|(index, run)| prepare(rig, run, &extra_names, index, reach_factor))
             .collect();
         let (mut series, faults): (Vec<Series>, Vec<Vec<DataFault>>) = prepared.into_iter().unzip();
         let mut faults = faults.concat();
@@ -274,7 +275,7 @@ impl Data {
             faults.extend(series.iter_mut().filter_map(silenced));
         }
         Self {
-            extra_names: extra_names.to_vec(),
+            extra_names,
             faults,
             ..Self::of(rig, series, context)
         }

@@ -3,6 +3,7 @@
 
 use rayon::prelude::*;
 
+use crate::campaign::Rig;
 use crate::data::Data;
 use crate::innovations::derivatives::tyre_slopes_in;
 use crate::innovations::rows::tyre_row_of;
@@ -91,17 +92,24 @@ fn step(data: &Data, model: &Model, readings: &[Vec<f64>]) -> Option<[f64; 2]> {
         .then(|| [(c * u - b * v) / determinant, (a * v - b * u) / determinant])
 }
 
+/// A law by plain least squares.
+pub(crate) struct Plain {
+    /// The law alone.
+    pub(crate) model: Model,
+    /// Mean square of what it leaves of the drag, in N²; infinite where there is none.
+    pub(crate) left: f64,
+}
+
 /// The law fitted to the channels as recorded, by the runs given: the best peak friction at each slip at the peak, and
 /// the best of these on ever finer grids.
-pub(crate) fn plain(data: &Data, series: &[Series]) -> Model {
-    let rig = &data.rig;
+pub(crate) fn plain(rig: &Rig, series: &[Series]) -> Plain {
     let square = |log_critical: f64| -> (f64, f64) {
-        let LawProducts { xx, xy, yy, .. } =
+        let LawProducts { xx, xy, yy, count } =
             LawProducts::of(series, rig.radius_m, log_critical.exp());
         if xx > 0.0 {
-            (yy - xy * xy / xx, xy / xx)
+            ((yy - xy * xy / xx) / count, xy / xx)
         } else {
-            (yy, rig.peak_friction)
+            (f64::INFINITY, rig.peak_friction)
         }
     };
     let mut best = (f64::INFINITY, rig.critical_slip.ln(), rig.peak_friction);
@@ -117,5 +125,8 @@ pub(crate) fn plain(data: &Data, series: &[Series]) -> Model {
         }
         width /= 4.0;
     }
-    Model::of_law(best.2, best.1.exp())
+    Plain {
+        model: Model::of_law(best.2, best.1.exp()),
+        left: best.0,
+    }
 }

@@ -20,8 +20,8 @@ const MIN_LOAD_SHARE: f64 = 0.02;
 const MAX_REACH_S: f64 = 0.04;
 /// Shortest half-window of the smoother in samples: a derivative needs neighbours.
 const LEAST_REACH: f64 = 1.2;
-/// Largest factor by which the windows are widened where slip is noisy.
-pub const MOST_REACH: f64 = 4.0;
+/// Factors by which the smoother's windows may be widened.
+pub const REACH_FACTORS: [f64; 3] = [1.0, 2.0, 4.0];
 
 /// Reach of the means that leave the slow part of a channel, in s.
 const SLOW_REACH_S: f64 = 0.08;
@@ -112,8 +112,8 @@ pub fn mean_twice_about(
     mean_about(time, &once, segments, reach)
 }
 
-/// Prepares one run. `extra_names` fixes the order of the other columns over the campaign, `reach_factor`
-/// (1..=[`MOST_REACH`]) widens the smoothing windows.
+/// Prepares one run. `extra_names` fixes the order of the other columns over the campaign, `reach_factor`,
+/// one of [`REACH_FACTORS`], widens the smoothing windows.
 #[must_use]
 pub fn prepare(
     rig: &Rig,

@@ -1,5 +1,7 @@
 //! Timing between the channels, from all balances at once: shifted until no derivative of a channel explains anything.
 
+use rayon::prelude::*;
+
 use super::correct::{Lateness, TimingStd};
 use super::held::without_holds;
 use crate::audit::{Audit, Timing as Late};
@@ -15,7 +17,9 @@ use crate::innovations::blocks::blocks;
 use crate::innovations::gram::{solve, total};
 use crate::innovations::hypothesis::{Effort, Guess, Judged, judge, noise_stride};
 use crate::innovations::slip::reconciled;
+use crate::law::plain;
 use crate::model::Model;
+use crate::prepare::REACH_FACTORS;
 use crate::series::{Channel, Series};
 use crate::split::Split;
 
@@ -231,8 +235,9 @@ pub fn averaging(runs: &[Run]) -> usize {
     by_step * by_size.min(most)
 }
 
-/// A campaign as it was recorded: what was held is drawn as lines, neighbours are averaged.
-struct Recorded<'a> {
+/// A campaign as it was recorded, but for what is kept for the proof: what was held is drawn as lines, neighbours are
+/// averaged.
+pub struct Recorded<'a> {
     rig: &'a Rig,
     runs: Vec<Run>,
     averaged: usize,
@@ -240,15 +245,58 @@ struct Recorded<'a> {
     split: &'a Split,
 }
 
-impl Recorded<'_> {
-    /// The same with its channels brought to the drag's time.
-    fn at_one_time(&self, late: Lateness) -> Data {
+impl<'a> Recorded<'a> {
+    /// These runs, which the audit was made of, without what this split keeps.
+    #[must_use]
+    pub fn new(rig: &'a Rig, runs: &[Run], audit: &'a Audit, split: &'a Split) -> Self {
+        let averaged = averaging(runs);
+        let lines = runs.iter().map(|r| without_holds(r).averaged(averaged));
+        Self {
+            rig,
+            runs: lines.collect(),
+            averaged,
+            audit,
+            split,
+        }
+    }
+
+    /// The factor on the windows of smoothing by which the law alone, with the channels at the drag's time, leaves least
+    /// of the drag: slip that is noisier and slip whose peaks are flattened predict it worse.
+    #[must_use]
+    pub fn best_reach(&self, timing: &Timing) -> f64 {
+        let corrected = self.corrected(timing.found);
+        let left = |reach_factor: &f64| {
+            let mut data = Data::smoothed(self.rig, &corrected, *reach_factor);
+            self.split.take_out(&mut data.series);
+            plain(self.rig, &data.series).left
+        };
+        let left: Vec<f64> = REACH_FACTORS.par_iter().map(left).collect();
+        let all = REACH_FACTORS.into_iter().zip(left);
+        let best = all.min_by(|a, b| a.1.total_cmp(&b.1));
+        best.map_or(REACH_FACTORS[0], |best| best.0)
+    }
+
+    /// As a prediction by the repaired model is made from it, with windows of smoothing that are so many times as wide.
+    #[must_use]
+    pub fn smoothed(&self, timing: &Timing, reach_factor: f64) -> Data {
+        let corrected = self.corrected(timing.late);
+        let mut data = Data::smoothed(self.rig, &corrected, reach_factor);
+        data.averaged = self.averaged;
+        self.split.take_out(&mut data.series);
+        data
+    }
+
+    fn corrected(&self, late: Lateness) -> Vec<Run> {
         let shifted = self
             .runs
             .iter()
             .map(|r| late.shifted(r).only(&late.known(r)));
-        let corrected: Vec<Run> = shifted.collect();
-        let mut data = Data::new(self.rig, &corrected);
+        shifted.collect()
+    }
+
+    /// The same with its channels brought to the drag's time.
+    fn at_one_time(&self, late: Lateness) -> Data {
+        let mut data = Data::new(self.rig, &self.corrected(late));
         data.averaged = self.averaged;
         self.split.take_out(&mut data.series);
         data.blocks = blocks(&data.series);
@@ -257,6 +305,50 @@ impl Recorded<'_> {
         data.vehicle_colour = self.audit.vehicle_colour;
         data.vehicle_filtered = self.audit.vehicle_filtered();
         data
+    }
+
+    /// Brings the channels to the drag channel's time and fits the base law to them. `start` is where the search for the
+    /// timing starts, where that is known better than from the audit.
+    #[must_use]
+    pub fn timed(&self, start: Option<&Timing>) -> Option<(Data, Timing, Judged)> {
+        let audit = self.audit;
+        let mut timing = Timing::default();
+        let known = |t: &Late| if t.std.is_finite() { t.value } else { 0.0 };
+        match start {
+            Some(start) => timing.late = start.found,
+            None => {
+                timing.late.wheel = known(&audit.wheel_late);
+                timing.late.vehicle = known(&audit.vehicle_late);
+                timing.late.brake = known(&audit.brake_late);
+            }
+        }
+        let mut model = Model::of_law(self.rig.peak_friction, self.rig.critical_slip);
+        let mut guess = None;
+        for pass in 0..=PASSES {
+            let data = self.at_one_time(timing.late);
+            if usable(&data) < LEAST_USABLE {
+                return None;
+            }
+            timing.late.turn = data.context.mean_wheel_speed;
+            let last = pass == PASSES;
+            let effort = Effort {
+                steps: if pass == 0 { 5 } else { 2 },
+                noise_steps: if pass == 0 || last { 30 } else { 10 },
+                noise_stride: noise_stride(&data),
+            };
+            let before = guess.as_deref().map_or(Guess::None, Guess::Sizes);
+            let judged = judge(&data, &model, &[], before, effort)?;
+            let (shift, std) = shifts(&data, &judged)?;
+            timing.asked(audit, shift, std);
+            model = judged.model.clone();
+            let small = shift.iter().all(|s| s.abs() < SMALL_SHIFT_S);
+            if last || (small && pass >= 2) {
+                return self.left_to_physics(data, judged, timing, start, effort);
+            }
+            guess = Some(judged.parts);
+            timing.moved(audit, shift);
+        }
+        None
     }
 
     /// What is left to physics once the timing is found: a drag later than all others, or a brake's reading before its
@@ -372,64 +464,6 @@ fn within(known: &Late, value: f64, std: f64) -> f64 {
     }
 }
 
-/// Brings the channels to the drag channel's time and fits the base law to them, by what is not kept for the proof.
-/// `start` is where the search for the timing starts, where that is known better than from the audit.
-#[must_use]
-pub fn timed(
-    rig: &Rig,
-    runs: &[Run],
-    audit: &Audit,
-    split: &Split,
-    start: Option<&Timing>,
-) -> Option<(Data, Timing, Judged)> {
-    let averaged = averaging(runs);
-    let plain = runs.iter().map(|r| without_holds(r).averaged(averaged));
-    let recorded = Recorded {
-        rig,
-        runs: plain.collect(),
-        averaged,
-        audit,
-        split,
-    };
-    let mut timing = Timing::default();
-    let known = |t: &Late| if t.std.is_finite() { t.value } else { 0.0 };
-    match start {
-        Some(start) => timing.late = start.found,
-        None => {
-            timing.late.wheel = known(&audit.wheel_late);
-            timing.late.vehicle = known(&audit.vehicle_late);
-            timing.late.brake = known(&audit.brake_late);
-        }
-    }
-    let mut model = Model::of_law(rig.peak_friction, rig.critical_slip);
-    let mut guess = None;
-    for pass in 0..=PASSES {
-        let data = recorded.at_one_time(timing.late);
-        if usable(&data) < LEAST_USABLE {
-            return None;
-        }
-        timing.late.turn = data.context.mean_wheel_speed;
-        let last = pass == PASSES;
-        let effort = Effort {
-            steps: if pass == 0 { 5 } else { 2 },
-            noise_steps: if pass == 0 || last { 30 } else { 10 },
-            noise_stride: noise_stride(&data),
-        };
-        let before = guess.as_deref().map_or(Guess::None, Guess::Sizes);
-        let judged = judge(&data, &model, &[], before, effort)?;
-        let (shift, std) = shifts(&data, &judged)?;
-        timing.asked(audit, shift, std);
-        model = judged.model.clone();
-        let small = shift.iter().all(|s| s.abs() < SMALL_SHIFT_S);
-        if last || (small && pass >= 2) {
-            return recorded.left_to_physics(data, judged, timing, start, effort);
-        }
-        guess = Some(judged.parts);
-        timing.moved(audit, shift);
-    }
-    None
-}
-
 /// Share of a speed's rate that is the speed's, and not noise of its reading, by mean squares: a shift by a noisy rate
 /// comes out smaller by that much.
 fn reliability(data: &Data, channel: fn(&Series) -> &Channel) -> f64 {
@@ -489,6 +523,8 @@ fn shifts(data: &Data, judged: &Judged) -> Option<([f64; 4], [f64; 3])> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use rand::SeedableRng as _;
+    use rand_distr::Distribution as _;
 
     fn timing(wheel: f64, vehicle: f64, brake: f64) -> Timing {
         let late = |value| Late { value, std: 3e-4 };
@@ -612,6 +648,44 @@ mod tests {
         let mut left = timing(-0.010, -0.010, -0.018);
         left.leave(0.010);
         assert!(!left.brake_early());
+    }
+
+    /// A wheel that is braked at a held speed, its slip to and fro at so many hertz, whose speed is read with noise.
+    fn braked(frequency_hz: f64) -> (Rig, Run) {
+        let rig = Rig {
+            radius_m: 0.3,
+            peak_friction: 0.8,
+            critical_slip: 0.12,
+            ..Rig::default()
+        };
+        let mut draw = rand_chacha::ChaCha8Rng::seed_from_u64(3);
+        let mut run = Run::default();
+        for k in 0..3000 {
+            let time = 2.5e-3 * f64::from(k);
+            let phase = core::f64::consts::TAU * frequency_hz * time;
+            let (slip, speed) = (0.05 + 0.04 * phase.sin(), 20.0);
+            let noise: f64 = rand_distr::StandardNormal.sample(&mut draw);
+            let x = slip / rig.critical_slip;
+            run.time_s.push(time);
+            run.wheel_speed_rad_s
+                .push((1.0 - slip) * speed / rig.radius_m + 1.5 * noise);
+            run.vehicle_speed_m_s.push(speed);
+            run.normal_force_n.push(4000.0);
+            run.drag_force_n
+                .push(4000.0 * rig.peak_friction * 2.0 * x / (1.0 + x * x));
+        }
+        (rig, run)
+    }
+
+    #[test]
+    fn windows_are_wide_where_noise_spoils_the_slip_and_narrow_where_they_would_flatten_it() {
+        let reach = |frequency_hz: f64| {
+            let (rig, run) = braked(frequency_hz);
+            let (audit, split) = (Audit::default(), Split::default());
+            let recorded = Recorded::new(&rig, core::slice::from_ref(&run), &audit, &split);
+            recorded.best_reach(&Timing::default())
+        };
+        assert!(reach(0.5) > reach(10.0));
     }
 
     #[test]

@@ -4,7 +4,7 @@ use nalgebra::DMatrix;
 
 use crate::audit::Audit;
 use crate::campaign::{Rig, Run};
-use crate::chain::timing::{Timing, timed};
+use crate::chain::timing::{Recorded, Timing};
 use crate::data::Data;
 use crate::decide::{Decision, Trial, could_stand, decide};
 use crate::innovations::hypothesis::{Judged, whole_over_slow};
@@ -41,6 +41,8 @@ pub(super) struct Answer<'a> {
     pub(super) kept: Split,
     pub(super) audit: &'a Audit,
     pub(super) data: Data,
+    /// The same, smoothed as predicts the drag best.
+    pub(super) to_predict: Data,
     pub(super) timing: Timing,
     /// What unseen runs refuted before.
     pub(super) not_asked: Vec<Id>,
@@ -55,10 +57,16 @@ impl<'a> Answer<'a> {
         given: &'a Given<'a>,
         kept: &Split,
         audit: &'a Audit,
-        timing: Option<&Timing>,
+        other: Option<&Self>,
         not_asked: Vec<Id>,
     ) -> Option<Self> {
-        let (data, timing, base) = timed(given.rig, given.runs, audit, kept, timing)?;
+        let recorded = Recorded::new(given.rig, given.runs, audit, kept);
+        let (data, timing, base) = recorded.timed(other.map(|other| &other.timing))?;
+        let reach_factor = other.map_or_else(
+            || recorded.best_reach(&timing),
+            |other| other.to_predict.context.reach_factor,
+        );
+        let to_predict = recorded.smoothed(&timing, reach_factor);
         // Delays of the speeds are the chain's: they are named by what the timing shows.
         let mut excluded = data.catalogue.delays();
         excluded.extend_from_slice(&not_asked);
@@ -68,6 +76,7 @@ impl<'a> Answer<'a> {
             kept: kept.clone(),
             audit,
             data,
+            to_predict,
             timing,
             not_asked,
             decision,

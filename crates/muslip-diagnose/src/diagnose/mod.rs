@@ -15,6 +15,7 @@ use crate::audit::{Audit, audit};
 use crate::campaign::{Rig, Run};
 use crate::constants::LEAST_OF_TYRE;
 use crate::data::Data;
+use crate::law::plain;
 use crate::looked::looked_for;
 use crate::mechanism::Id;
 use crate::model::Model;
@@ -95,10 +96,10 @@ pub fn diagnose(rig: &Rig, runs: Vec<Run>, progress: Progress<'_>) -> Diagnosis 
 
 impl Given<'_> {
     /// The law fitted to the channels as recorded by plain least squares, by what is not kept.
-    fn plain_law(&self, kept: &Split) -> Vec<f64> {
-        let mut series = self.data.series.clone();
+    fn plain_law(&self, kept: &Split, reach_factor: f64) -> Vec<f64> {
+        let mut series = Data::smoothed(self.rig, self.runs, reach_factor).series;
         kept.take_out(&mut series);
-        crate::law::plain(&self.data, &series).base
+        plain(self.rig, &series).model.base
     }
 
     fn undecided(&self, audit: Audit) -> Diagnosis {

@@ -10,7 +10,7 @@ use crate::constants::{
 };
 use crate::data::Data;
 use crate::law::closest;
-use crate::mechanism::Stage;
+use crate::mechanism::{Context, Stage};
 use crate::model::{Model, TYRE_BASE};
 use crate::number::{finite_or_zero, mean_and_std};
 use crate::repaired::{Domain, KnownRecording, NoiseModel, Repaired, RepairedTerm, Which};
@@ -26,6 +26,7 @@ impl Answer<'_> {
     /// The model with what was named, its channels at one time where they are named late.
     pub(super) fn repaired(&self) -> Repaired {
         let data = &self.data;
+        let reach_factor = self.to_predict.context.reach_factor;
         let chosen = &self.decision.chosen;
         let unplaced = chosen.model.without_order(&data.catalogue, &data.context);
         let covariance = self.covariance(chosen);
@@ -40,7 +41,7 @@ impl Answer<'_> {
             averaged: self.given.averaged,
             rig: data.rig.clone(),
             late,
-            base_alone: self.given.plain_law(&self.kept),
+            base_alone: self.given.plain_law(&self.kept, reach_factor),
             base: self.predicting_base(&chosen.model),
             base_unplaced: if unplaced.terms.len() < chosen.model.terms.len() {
                 self.predicting_base(&unplaced)
@@ -63,7 +64,10 @@ impl Answer<'_> {
                 ..NoiseModel::default()
             },
             domain: self.domain(),
-            context: data.context.clone(),
+            context: Context {
+                reach_factor,
+                ..data.context.clone()
+            },
             recordings: self
                 .given
                 .runs
@@ -177,8 +181,9 @@ impl Answer<'_> {
     /// The law's two parameters that predict best beside the terms of a model and the corrections: by plain least
     /// squares, for a prediction has noisy inputs, too.
     fn predicting_base(&self, model: &Model) -> Vec<f64> {
-        let drags = self.decision.chosen.drag_to_explain(&self.data);
-        closest(&self.data, model, &drags).base
+        let data = &self.to_predict;
+        let drags = self.decision.chosen.drag_to_explain(data);
+        closest(data, model, &drags).base
     }
 }
 

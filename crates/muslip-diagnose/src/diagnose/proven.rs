@@ -43,7 +43,7 @@ impl<'a> Proven<'a> {
         let mut found = answer.repaired();
         let mut names = None;
         found.proof = if answer.found_nothing() {
-            let law = given.plain_law(&kept);
+            let law = given.plain_law(&kept, answer.to_predict.context.reach_factor);
             Predicting {
                 base_alone: law.clone(),
                 base: law,
@@ -51,7 +51,7 @@ impl<'a> Proven<'a> {
             }
         } else {
             let not_asked = answer.not_asked.clone();
-            let again = Answer::of(given, &kept, audit, Some(&answer.timing), not_asked);
+            let again = Answer::of(given, &kept, audit, Some(&answer), not_asked);
             again.map_or_else(Predicting::default, |again| {
                 let of_force = again.names_of_force();
                 names = Some(Again {
