@@ -43,6 +43,9 @@ pub struct Context {
     pub first_time: f64,
     /// Noise of the drag channel in N.
     pub drag_sigma: f64,
+    /// Noise of a reading of the slip, median while rolling.
+    #[serde(default)]
+    pub slip_sigma: f64,
     /// Largest drag reading (99.9th percentile) in N.
     pub max_drag: f64,
     /// Factor by which the smoothing windows are widened, for slip is noisy here.

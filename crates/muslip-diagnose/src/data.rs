@@ -323,6 +323,10 @@ impl Data {
         };
         let steps = series.iter().map(|s| s.typical_dt);
         let sigmas = series.iter().map(|s| s.drag_sigma);
+        let slip_sigmas = series.iter().flat_map(|s| {
+            let rolling = (0..s.len()).filter(|&k| s.rolling[k]);
+            rolling.map(|k| s.slip_sigma(k, rig.radius_m))
+        });
         let mut context = Context {
             radius: rig.radius_m,
             inertia: rig.wheel_inertia_kg_m2,
@@ -351,6 +355,7 @@ impl Data {
                 .and_then(|s| s.time.first().copied())
                 .unwrap_or(0.0),
             drag_sigma: median(sigmas.filter(|s| *s > 0.0).collect(), 0.0),
+            slip_sigma: median(slip_sigmas.collect(), 0.0),
             max_drag: largest_drag(series).abs().max(1e-9),
             ..Context::default()
         };

@@ -159,6 +159,13 @@ impl Series {
             0.0
         }
     }
+    /// Standard deviation of the slip as read from the noise of both speeds.
+    #[must_use]
+    pub fn slip_sigma(&self, k: usize, radius: f64) -> f64 {
+        let (wheel, speed) = (&self.wheel, &self.speed);
+        let [by_wheel, by_speed] = slip::slopes(radius, wheel.smooth[k], speed.smooth[k]);
+        (by_wheel * wheel.sigma).hypot(by_speed * speed.sigma)
+    }
     /// Standard deviation of the force on the nominal curve from the noise left in the smoothed slip, in N.
     #[must_use]
     pub fn slip_force_noise(&self, k: usize, context: &Context) -> f64 {

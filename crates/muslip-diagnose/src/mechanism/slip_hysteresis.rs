@@ -17,8 +17,11 @@ pub enum Form {
 /// All forms.
 pub const FORMS: [Form; 3] = [Form::Friction, Form::Slip, Form::Rate];
 
-/// Least half of a play, in slip: far below what any speed tells.
+/// Least half of a play, in slip: far below what any speed tells. Nor is it less than the noise of a reading of the slip:
+/// such a play only averages the noise, which predicts the drag better and says nothing of the tyre.
 const LEAST_HALF_PLAY: f64 = 1e-4;
+/// Largest half of a play, in slip.
+const MOST_HALF_PLAY: f64 = 0.1;
 
 /// Rising slip and falling slip follow different curves, whatever the rate.
 pub struct SlipHysteresis {
@@ -93,13 +96,18 @@ impl Describe for SlipHysteresis {
             ..Facts::of(Id::SlipHysteresis, stage, equation)
         }
     }
-    fn parameters(&self, _context: &Context) -> Vec<Parameter> {
+    fn parameters(&self, context: &Context) -> Vec<Parameter> {
         match self.form {
             Form::Friction => vec![
                 Parameter::new("loop_share", "1", -0.6, 0.6),
                 Parameter::new("width", "1", 0.001, 0.15),
             ],
-            Form::Slip => vec![Parameter::new("half_play", "1", LEAST_HALF_PLAY, 0.1)],
+            Form::Slip => {
+                let least = context
+                    .slip_sigma
+                    .clamp(LEAST_HALF_PLAY, 0.5 * MOST_HALF_PLAY);
+                vec![Parameter::new("half_play", "1", least, MOST_HALF_PLAY)]
+            }
             Form::Rate => vec![
                 Parameter::new("loop_share", "1", -0.6, 0.6),
                 Parameter::new("width", "1", 0.001, 0.15),
