@@ -9,8 +9,8 @@ use crate::campaign::{Rig, Run};
 use crate::constants::{
     ALIKE_LATE, ALIKE_LATE_S, AUDIT_REACH, FAR_BETTER, HEARD_S, IN_STEP_S,
     LEAST_BRAKE_EARLY_IN_STEP_S, LEAST_BRAKE_EARLY_S, LEAST_DRAG_LATE_S, LEAST_RELIABLE,
-    LEAST_STD_S, LEAST_STDS_TOLD, LEAST_USABLE, LONGEST_TO_EARLY, UNKNOWN_STDS, VAGUE_AUDIT_S,
-    VAGUE_S,
+    LEAST_STD_S, LEAST_STDS_TOLD, LEAST_USABLE, LONGEST_TO_EARLY, MOST_WORSE, UNKNOWN_STDS,
+    VAGUE_AUDIT_S, VAGUE_S,
 };
 use crate::data::Data;
 use crate::innovations::blocks::blocks;
@@ -261,19 +261,25 @@ impl<'a> Recorded<'a> {
     }
 
     /// The factor on the windows of smoothing by which the law alone, with the channels at the drag's time, leaves least
-    /// of the drag: slip that is noisier and slip whose peaks are flattened predict it worse.
+    /// of the drag: slip that is noisier and slip whose peaks are flattened predict it worse. `usual` stands where it is
+    /// hardly worse.
     #[must_use]
-    pub fn best_reach(&self, timing: &Timing) -> f64 {
+    pub fn best_reach(&self, timing: &Timing, usual: f64) -> f64 {
         let corrected = self.corrected(timing.found);
         let left = |reach_factor: &f64| {
             let mut data = Data::smoothed(self.rig, &corrected, *reach_factor);
             self.split.take_out(&mut data.series);
             plain(self.rig, &data.series).left
         };
-        let left: Vec<f64> = REACH_FACTORS.par_iter().map(left).collect();
-        let all = REACH_FACTORS.into_iter().zip(left);
-        let best = all.min_by(|a, b| a.1.total_cmp(&b.1));
-        best.map_or(REACH_FACTORS[0], |best| best.0)
+        let all: Vec<(f64, f64)> = REACH_FACTORS
+            .par_iter()
+            .map(|own| (*own, left(own)))
+            .collect();
+        let of_usual = all.iter().find(|own| own.0 == usual);
+        let of_usual = of_usual.map_or(f64::INFINITY, |own| own.1);
+        let best = all.iter().min_by(|a, b| a.1.total_cmp(&b.1));
+        best.filter(|best| best.1 * MOST_WORSE < of_usual)
+            .map_or(usual, |best| best.0)
     }
 
     /// As a prediction by the repaired model is made from it, with windows of smoothing that are so many times as wide.
@@ -683,7 +689,7 @@ mod tests {
             let (rig, run) = braked(frequency_hz);
             let (audit, split) = (Audit::default(), Split::default());
             let recorded = Recorded::new(&rig, core::slice::from_ref(&run), &audit, &split);
-            recorded.best_reach(&Timing::default())
+            recorded.best_reach(&Timing::default(), 1.0)
         };
         assert!(reach(0.5) > reach(10.0));
     }

@@ -63,7 +63,7 @@ impl<'a> Answer<'a> {
         let recorded = Recorded::new(given.rig, given.runs, audit, kept);
         let (data, timing, base) = recorded.timed(other.map(|other| &other.timing))?;
         let reach_factor = other.map_or_else(
-            || recorded.best_reach(&timing),
+            || recorded.best_reach(&timing, data.context.reach_factor),
             |other| other.to_predict.context.reach_factor,
         );
         let to_predict = recorded.smoothed(&timing, reach_factor);
