@@ -218,7 +218,7 @@ pub const LEAST_STDS_GAINED: f64 = 1.0;
 /// As [`LEAST_STDS_GAINED`], of what the error falls by as a share of itself, before the model is exported for recordings to
 /// come: of 520 fresh runs of 260 development campaigns it then predicts 3 worse by a percent than the base, and 11 without.
 pub const LEAST_STDS_EXPORTED: f64 = 1.6;
-/// Factor on the square of a recording's error that is still no worse: one percent, as the bench has it.
+/// Factor on the square of an error that is still no worse: one percent, as the bench has it.
 pub const MOST_WORSE: f64 = 1.01;
 /// Fewest samples of a run from which its tyre balance says anything.
 pub const LEAST_OF_TYRE: usize = 30;

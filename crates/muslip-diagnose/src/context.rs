@@ -43,12 +43,12 @@ pub struct Context {
     pub first_time: f64,
     /// Noise of the drag channel in N.
     pub drag_sigma: f64,
-    /// Noise of a reading of the slip, median while rolling.
+    /// Noise of the slip as read, of as white a noise as its speeds' readings have over a window; median while rolling.
     #[serde(default)]
     pub slip_sigma: f64,
     /// Largest drag reading (99.9th percentile) in N.
     pub max_drag: f64,
-    /// Factor by which the smoothing windows are widened, for slip is noisy here.
+    /// Factor by which the smoothing windows are widened.
     pub reach_factor: f64,
     /// Work before each run in J and clock offset of each run in s, by position.
     pub before: Vec<Before>,

@@ -239,14 +239,15 @@ impl Data {
     /// physics: where it is a good part of the residual, the windows of smoothing are widened.
     #[must_use]
     pub fn new(rig: &Rig, runs: &[Run]) -> Self {
-        let narrow = Self::smoothed(rig, runs, REACH_FACTORS[0]);
-        REACH_FACTORS[1..].iter().fold(narrow, |data, wider| {
-            if data.slip_noise_share() > SLIP_NOISE_SHARE {
-                Self::smoothed(rig, runs, *wider)
-            } else {
-                data
+        let [narrow, wider @ ..] = REACH_FACTORS;
+        let mut data = Self::smoothed(rig, runs, narrow);
+        for reach_factor in wider {
+            if data.slip_noise_share() <= SLIP_NOISE_SHARE {
+                break;
             }
-        })
+            data = Self::smoothed(rig, runs, reach_factor);
+        }
+        data
     }
 
     /// Prepares all runs of a campaign with windows of smoothing that are so many times as wide.
@@ -355,11 +356,41 @@ impl Data {
                 .and_then(|s| s.time.first().copied())
                 .unwrap_or(0.0),
             drag_sigma: median(sigmas.filter(|s| *s > 0.0).collect(), 0.0),
-            slip_sigma: median(slip_sigmas.collect(), 0.0),
+            slip_sigma: median(slip_sigmas.filter(|s| s.is_finite()).collect(), 0.0),
             max_drag: largest_drag(series).abs().max(1e-9),
             ..Context::default()
         };
         take_up_work(&mut context, series);
         context
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_run_without_a_wheel_speed_leaves_the_noise_of_the_slip_known() {
+        let run = |wheel: f64| {
+            let rows = || (0..200).map(f64::from);
+            let shaken = |k: f64| 60.0 + 0.2 * (7.0 * k * k).sin();
+            Run {
+                time_s: rows().map(|k| 0.005 * k).collect(),
+                wheel_speed_rad_s: rows().map(|k| wheel * shaken(k)).collect(),
+                vehicle_speed_m_s: vec![20.0; 200],
+                normal_force_n: vec![4000.0; 200],
+                drag_force_n: vec![1000.0; 200],
+                ..Run::default()
+            }
+        };
+        let rig = Rig {
+            radius_m: 0.3,
+            peak_friction: 0.8,
+            critical_slip: 0.12,
+            ..Rig::default()
+        };
+        let data = Data::smoothed(&rig, &[run(f64::NAN), run(1.0), run(f64::NAN)], 1.0);
+        let sigma = data.context.slip_sigma;
+        assert!(sigma > 1e-4 && sigma < 0.01, "{sigma}");
     }
 }

@@ -96,11 +96,11 @@ fn step(data: &Data, model: &Model, readings: &[Vec<f64>]) -> Option<[f64; 2]> {
 pub(crate) struct Plain {
     /// The law alone.
     pub(crate) model: Model,
-    /// Mean square of what it leaves of the drag, in N²; infinite where there is none.
+    /// Mean square of what it leaves of the drag, in N²; infinite where no peak fits.
     pub(crate) left: f64,
 }
 
-/// The law fitted to the channels as recorded, by the runs given: the best peak friction at each slip at the peak, and
+/// The law fitted to the runs given, their channels as they are: the best peak friction at each slip at the peak, and
 /// the best of these on ever finer grids.
 pub(crate) fn plain(rig: &Rig, series: &[Series]) -> Plain {
     let square = |log_critical: f64| -> (f64, f64) {

@@ -456,6 +456,7 @@ fn context_complaint(context: &Context) -> Option<Complaint> {
         ("distance", context.distance),
         ("first_time", context.first_time),
         ("drag_sigma", context.drag_sigma),
+        ("slip_sigma", context.slip_sigma),
         ("max_drag", context.max_drag),
     ];
     positive

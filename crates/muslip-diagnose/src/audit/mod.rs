@@ -247,6 +247,16 @@ mod tests {
         }
     }
 
+    #[test]
+    fn slow_noise_of_the_drag_alone_shows_no_chain() {
+        let of = |channel| Audit {
+            findings: vec![Finding::of(channel, Word::ColouredNoise, (1.0, 0.1), "1")],
+            ..Audit::default()
+        };
+        assert!(!of("drag_force_n").shows_a_chain());
+        assert!(of("vehicle_speed_m_s").shows_a_chain());
+    }
+
     /// A coasting vehicle whose slip swings, its speeds read late by so many s.
     fn run(phase: f64, wheel_late: f64, vehicle_late: f64) -> Run {
         let (dt, count) = (1e-3, 8000);

@@ -273,25 +273,26 @@ impl<'a> Recorded<'a> {
         };
         let all: Vec<(f64, f64)> = REACH_FACTORS
             .par_iter()
-            .map(|own| (*own, left(own)))
+            .map(|factor| (*factor, left(factor)))
             .collect();
-        let of_usual = all.iter().find(|own| own.0 == usual);
-        let of_usual = of_usual.map_or(f64::INFINITY, |own| own.1);
+        let of_usual = all.iter().find(|factor| factor.0 == usual);
+        let usual_left = of_usual.map_or(f64::INFINITY, |factor| factor.1);
         let best = all.iter().min_by(|a, b| a.1.total_cmp(&b.1));
-        best.filter(|best| best.1 * MOST_WORSE < of_usual)
+        best.filter(|best| best.1 * MOST_WORSE < usual_left)
             .map_or(usual, |best| best.0)
     }
 
-    /// As a prediction by the repaired model is made from it, with windows of smoothing that are so many times as wide.
+    /// With its channels at the drag's time and windows of smoothing that are so many times as wide: what the law of a
+    /// repaired model is fitted to, by plain least squares as it predicts.
     #[must_use]
     pub fn smoothed(&self, timing: &Timing, reach_factor: f64) -> Data {
         let corrected = self.corrected(timing.late);
         let mut data = Data::smoothed(self.rig, &corrected, reach_factor);
-        data.averaged = self.averaged;
         self.split.take_out(&mut data.series);
         data
     }
 
+    /// The runs with their channels brought to the drag's time.
     fn corrected(&self, late: Lateness) -> Vec<Run> {
         let shifted = self
             .runs
@@ -300,7 +301,7 @@ impl<'a> Recorded<'a> {
         shifted.collect()
     }
 
-    /// The same with its channels brought to the drag's time.
+    /// With its channels brought to the drag's time, as the argument takes it.
     fn at_one_time(&self, late: Lateness) -> Data {
         let mut data = Data::new(self.rig, &self.corrected(late));
         data.averaged = self.averaged;

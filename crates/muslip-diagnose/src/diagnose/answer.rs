@@ -9,7 +9,7 @@ use crate::data::Data;
 use crate::decide::{Decision, Trial, could_stand, decide};
 use crate::innovations::hypothesis::{Judged, whole_over_slow};
 use crate::innovations::noise::BalanceParts;
-use crate::mechanism::{Balance, Id};
+use crate::mechanism::{Balance, Context, Id};
 use crate::model::TYRE_BASE;
 use crate::number::finite_or_zero;
 use crate::split::Split;
@@ -41,7 +41,7 @@ pub(super) struct Answer<'a> {
     pub(super) kept: Split,
     pub(super) audit: &'a Audit,
     pub(super) data: Data,
-    /// The same, smoothed as predicts the drag best.
+    /// The recordings at one time, smoothed as predicts the drag best.
     pub(super) to_predict: Data,
     pub(super) timing: Timing,
     /// What unseen runs refuted before.
@@ -52,7 +52,8 @@ pub(super) struct Answer<'a> {
 }
 
 impl<'a> Answer<'a> {
-    /// The argument with none of the names that are not asked for; `None` where nothing usable is left.
+    /// The argument with none of the names that are not asked for; `None` where nothing usable is left. It keeps timing
+    /// and windows of an `other` that was held before.
     pub(super) fn of(
         given: &'a Given<'a>,
         kept: &Split,
@@ -66,7 +67,12 @@ impl<'a> Answer<'a> {
             || recorded.best_reach(&timing, data.context.reach_factor),
             |other| other.to_predict.context.reach_factor,
         );
-        let to_predict = recorded.smoothed(&timing, reach_factor);
+        let mut to_predict = recorded.smoothed(&timing, reach_factor);
+        // Sizes that give the parameters of terms their scale are the argument's.
+        to_predict.context = Context {
+            reach_factor,
+            ..data.context.clone()
+        };
         // Delays of the speeds are the chain's: they are named by what the timing shows.
         let mut excluded = data.catalogue.delays();
         excluded.extend_from_slice(&not_asked);

@@ -95,9 +95,15 @@ pub fn diagnose(rig: &Rig, runs: Vec<Run>, progress: Progress<'_>) -> Diagnosis 
 }
 
 impl Given<'_> {
-    /// The law fitted to the channels as recorded by plain least squares, by what is not kept.
+    /// The law fitted by plain least squares to the channels as recorded, smoothed by windows that are so many times as wide,
+    /// by what is not kept.
     fn plain_law(&self, kept: &Split, reach_factor: f64) -> Vec<f64> {
-        let mut series = Data::smoothed(self.rig, self.runs, reach_factor).series;
+        let own = &self.data;
+        let mut series = if reach_factor == own.context.reach_factor {
+            own.series.clone()
+        } else {
+            Data::smoothed(self.rig, self.runs, reach_factor).series
+        };
         kept.take_out(&mut series);
         plain(self.rig, &series).model.base
     }

@@ -10,7 +10,7 @@ use crate::constants::{
 };
 use crate::data::Data;
 use crate::law::closest;
-use crate::mechanism::{Context, Stage};
+use crate::mechanism::Stage;
 use crate::model::{Model, TYRE_BASE};
 use crate::number::{finite_or_zero, mean_and_std};
 use crate::repaired::{Domain, KnownRecording, NoiseModel, Repaired, RepairedTerm, Which};
@@ -64,10 +64,7 @@ impl Answer<'_> {
                 ..NoiseModel::default()
             },
             domain: self.domain(),
-            context: Context {
-                reach_factor,
-                ..data.context.clone()
-            },
+            context: self.to_predict.context.clone(),
             recordings: self
                 .given
                 .runs

@@ -17,8 +17,7 @@ pub enum Form {
 /// All forms.
 pub const FORMS: [Form; 3] = [Form::Friction, Form::Slip, Form::Rate];
 
-/// Least half of a play, in slip: far below what any speed tells. Nor is it less than the noise of a reading of the slip:
-/// such a play only averages the noise, which predicts the drag better and says nothing of the tyre.
+/// Least half of a play, in slip: far below what any speed tells.
 const LEAST_HALF_PLAY: f64 = 1e-4;
 /// Largest half of a play, in slip.
 const MOST_HALF_PLAY: f64 = 0.1;
@@ -49,6 +48,12 @@ fn branch<T: Number>(width: T, full_rate: Option<T>, series: &Series, slip: &[T]
         }
     }
     all
+}
+
+/// Least half of a play that is told from the noise of a reading of the slip: a smaller one only averages that noise, which
+/// predicts the drag better and says nothing of the tyre.
+fn least_half_play(context: &Context) -> f64 {
+    context.slip_sigma.clamp(LEAST_HALF_PLAY, MOST_HALF_PLAY)
 }
 
 /// Slip that follows with a play of so much on either side (the play operator: Brokate and Sprekels 1996, Hysteresis and
@@ -103,9 +108,7 @@ impl Describe for SlipHysteresis {
                 Parameter::new("width", "1", 0.001, 0.15),
             ],
             Form::Slip => {
-                let least = context
-                    .slip_sigma
-                    .clamp(LEAST_HALF_PLAY, 0.5 * MOST_HALF_PLAY);
+                let least = least_half_play(context);
                 vec![Parameter::new("half_play", "1", least, MOST_HALF_PLAY)]
             }
             Form::Rate => vec![
@@ -120,11 +123,20 @@ impl Describe for SlipHysteresis {
         let critical = search.context.nominal[1];
         match self.form {
             Form::Friction => sizes.map(|width| vec![0.0, width]).collect(),
-            Form::Slip => sizes.map(|half_play| vec![half_play]).collect(),
+            Form::Slip => {
+                let least = least_half_play(search.context);
+                sizes
+                    .filter(|half_play| *half_play > least)
+                    .map(|half_play| vec![half_play])
+                    .collect()
+            }
             Form::Rate => [2.0, 8.0]
                 .map(|rate| vec![0.0, 0.012, rate * critical])
                 .to_vec(),
         }
+    }
+    fn owns(&self, p: &[f64], context: &Context) -> bool {
+        self.form != Form::Slip || above_limit(p[0], least_half_play(context))
     }
     fn statement(&self, reported: &[Reported<f64>], _p: &[f64]) -> String {
         let percent = 100.0 * reported[0].value;
@@ -238,6 +250,29 @@ mod tests {
         let slow = at(1e-6);
         let loops: Vec<f64> = branch(0.02, None, &series, &slip);
         assert!(slow.iter().zip(loops).all(|(a, b)| (a - b).abs() < 1e-12));
+    }
+
+    #[test]
+    fn a_play_no_larger_than_the_noise_of_the_slip_is_none_of_its_own() {
+        let play = SlipHysteresis { form: Form::Slip };
+        let noisy = Context {
+            slip_sigma: 0.004,
+            ..Context::default()
+        };
+        assert!(!play.owns(&[0.004], &noisy) && play.owns(&[0.008], &noisy));
+        let [parameter] = play.parameters(&noisy).try_into().unwrap();
+        assert!((parameter.low - 0.004).abs() < 1e-12);
+        let search = Search {
+            context: &noisy,
+            series: &[],
+            residuals: &[],
+        };
+        assert_eq!(play.starts(&search), [[0.012], [0.04]]);
+        // A loop of the friction has no such limit.
+        let friction = SlipHysteresis {
+            form: Form::Friction,
+        };
+        assert!(friction.owns(&[0.001, 0.001], &noisy));
     }
 
     #[test]
