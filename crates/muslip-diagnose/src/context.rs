@@ -43,7 +43,8 @@ pub struct Context {
     pub first_time: f64,
     /// Noise of the drag channel in N.
     pub drag_sigma: f64,
-    /// Noise of the slip as read, of as white a noise as its speeds' readings have over a window; median while rolling.
+    /// Standard deviation of the slip as read, from the white noise of both speeds (of held or counted ones, the white noise
+    /// that is as large over a window); median while rolling.
     #[serde(default)]
     pub slip_sigma: f64,
     /// Largest drag reading (99.9th percentile) in N.

@@ -267,8 +267,7 @@ impl<'a> Recorded<'a> {
     pub fn best_reach(&self, timing: &Timing, usual: f64) -> f64 {
         let corrected = self.corrected(timing.found);
         let left = |reach_factor: &f64| {
-            let mut data = Data::smoothed(self.rig, &corrected, *reach_factor);
-            self.split.take_out(&mut data.series);
+            let data = self.without_kept(Data::smoothed(self.rig, &corrected, *reach_factor));
             plain(self.rig, &data.series).left
         };
         let all: Vec<(f64, f64)> = REACH_FACTORS
@@ -287,7 +286,10 @@ impl<'a> Recorded<'a> {
     #[must_use]
     pub fn smoothed(&self, timing: &Timing, reach_factor: f64) -> Data {
         let corrected = self.corrected(timing.late);
-        let mut data = Data::smoothed(self.rig, &corrected, reach_factor);
+        self.without_kept(Data::smoothed(self.rig, &corrected, reach_factor))
+    }
+
+    fn without_kept(&self, mut data: Data) -> Data {
         self.split.take_out(&mut data.series);
         data
     }
@@ -303,9 +305,8 @@ impl<'a> Recorded<'a> {
 
     /// With its channels brought to the drag's time, as the argument takes it.
     fn at_one_time(&self, late: Lateness) -> Data {
-        let mut data = Data::new(self.rig, &self.corrected(late));
+        let mut data = self.without_kept(Data::new(self.rig, &self.corrected(late)));
         data.averaged = self.averaged;
-        self.split.take_out(&mut data.series);
         data.blocks = blocks(&data.series);
         data.timing_std = known_to(self.audit);
         data.vehicle_late = late.vehicle;
