@@ -112,6 +112,7 @@ impl Packed {
 }
 
 /// Least squares on inner products with a Gaussian prior on the coefficients.
+#[derive(Clone)]
 pub struct Solved {
     /// Coefficients of the chosen columns.
     pub coefficients: DVector<f64>,

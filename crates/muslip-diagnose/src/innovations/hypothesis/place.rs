@@ -25,10 +25,11 @@ use crate::model::Model;
 const SMALL_GAIN: f64 = 0.2;
 
 /// A model at one place of its parameters under noise of some sizes.
+#[derive(Clone)]
 pub struct Place {
     model: Model,
     noise: Noise,
-    table: Table,
+    table: Arc<Table>,
     /// Inner products by balance, run and half.
     by_balance: Vec<Vec<[Gram; 2]>>,
     /// Their sum over the balances.
@@ -61,7 +62,7 @@ impl Place {
             Known::Sizes(old) => Noise::new(data, with_sizes(parts(data, &slopes), old)),
             Known::Noise(old) => old.clone(),
         };
-        let table = table_of(data, &model, &slopes, extra);
+        let table = Arc::new(table_of(data, &model, &slopes, extra));
         let mut by_balance = grams_by_balance(&noise, &table);
         if let Known::Nothing(effort) = known {
             for _ in 0..SWEEPS {
@@ -78,7 +79,7 @@ impl Place {
     fn at(
         data: &Data,
         model: Model,
-        table: Table,
+        table: Arc<Table>,
         noise: Noise,
         by_balance: Vec<Vec<[Gram; 2]>>,
         held: bool,
@@ -128,6 +129,17 @@ impl Place {
     /// Nats that the linear model would still gain.
     fn to_gain(&self) -> f64 {
         0.5 * (self.here - self.solved.rss - self.sum.log_variance)
+    }
+
+    /// Negative logarithm of the prior of the noise's sizes.
+    fn penalty(&self) -> f64 {
+        self.noise.parts().iter().map(estimate::penalty).sum()
+    }
+
+    /// Negative restricted log likelihood at the best of the linear model: what the noise's sizes are fitted by.
+    fn restricted_loss(&self) -> f64 {
+        let (log_variance, solved) = (self.sum.log_variance, &self.solved);
+        0.5 * (log_variance + solved.rss + solved.log_det) + self.penalty()
     }
 
     /// The same place with the noise fitted to it: its columns, and by what the noise enters, stay what they are.
@@ -188,7 +200,8 @@ impl Place {
     }
 
     /// What is to be said of the model once its parameters, then the noise, then its parameters again are at their
-    /// best. `added` is whether only the noise of balances that its last term touches may change.
+    /// best; without the latter two where those are worse: sizes of the noise that are the best of part of the blocks need
+    /// not be the best of all. `added` is whether only the noise of balances that its last term touches may change.
     pub fn at_its_best(
         self,
         data: &Data,
@@ -196,10 +209,16 @@ impl Place {
         effort: Effort,
         added: bool,
     ) -> Option<Judged> {
-        self.descended(data, extra, effort.steps)?
-            .refitted(data, extra, effort, added)?
-            .descended(data, extra, effort.steps.div_ceil(2))?
-            .judged(data, extra)
+        let sought = self.descended(data, extra, effort.steps)?;
+        let refitted = sought
+            .clone()
+            .refitted(data, extra, effort, added)
+            .and_then(|place| place.descended(data, extra, effort.steps.div_ceil(2)));
+        match refitted {
+            Some(refitted) if refitted.restricted_loss() < sought.restricted_loss() => refitted,
+            _ => sought,
+        }
+        .judged(data, extra)
     }
 
     /// What is to be said of the model here.
@@ -213,10 +232,9 @@ impl Place {
         for (at, &i) in linear.iter().enumerate() {
             coefficients[i - 1] = best.coefficients[at];
         }
-        let penalty: f64 = self.noise.parts().iter().map(estimate::penalty).sum();
         let k = own_parameters(&self.model).len();
         Some(Judged {
-            loss: 0.5 * (self.sum.log_variance + best.rss) + penalty,
+            loss: 0.5 * (self.sum.log_variance + best.rss) + self.penalty(),
             free: self.model.vector().len() - self.model.base.len() + width(extra),
             extra: extra.to_vec(),
             covariance: self.solved.covariance.view((0, 0), (k, k)).into_owned(),
@@ -224,7 +242,7 @@ impl Place {
             prior: (0..n).map(prior).collect(),
             left: coefficients.clone(),
             unseen: unseen(data, &self.model, &self.table, &self.grams)?,
-            table: Some(Arc::new(self.table)),
+            table: Some(self.table),
             model: self.model,
             parts: self.noise.into_parts(),
             grams: self.grams,

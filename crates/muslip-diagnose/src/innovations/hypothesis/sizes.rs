@@ -23,7 +23,7 @@ pub struct Effort {
 }
 
 /// Blocks of one balance that are enough for the sizes of its noise.
-const ENOUGH_BLOCKS: usize = 6000;
+const ENOUGH_BLOCKS: usize = 20_000;
 
 /// Every so many blocks are enough for the sizes of the noise.
 #[must_use]
