@@ -26,6 +26,8 @@ pub struct Lateness {
 pub struct TimingStd {
     /// Wheel speed.
     pub wheel: f64,
+    /// Wheel speed, by the share of a turn that its sensor takes at the mean speed.
+    pub wheel_by_turn: f64,
     /// Vehicle speed.
     pub vehicle: f64,
     /// Brake torque or pressure.
@@ -37,6 +39,7 @@ impl Default for TimingStd {
     fn default() -> Self {
         Self {
             wheel: 0.02,
+            wheel_by_turn: 0.001,
             vehicle: 0.05,
             brake: 0.02,
         }

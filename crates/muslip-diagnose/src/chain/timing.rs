@@ -42,6 +42,8 @@ pub struct Timing {
     drag: f64,
     /// Whether the brake's reading is left as early as it is.
     leaves_brake: bool,
+    /// How early the wheel speed is left, in s.
+    wheel_left: f64,
 }
 
 impl Timing {
@@ -56,12 +58,13 @@ impl Timing {
 
     /// How late the drag is, in s, where a speed and all other channels are early, and alike: by what all of them are,
     /// for what one is early by beyond that is its own. Beside a wheel's speed and a brake that are, a vehicle's that is
-    /// late says nothing against it: its receiver is. Where one alone is known, it may as well be early by itself, its logger
-    /// ahead, if the channels have come through a chain that shows.
+    /// late says nothing against it: its receiver is. Of channels that have come through a chain that shows, two have to be
+    /// early and none late: there the drag's own filter or logger may be what is late.
     fn drag_late(&self, chain_shows: bool) -> Option<f64> {
         let known = |l: &&Late| l.std < VAGUE_S;
         let early = |l: &Late| known(&l) && l.value < 0.0;
-        let late_receiver = early(&self.wheel) && early(&self.brake) && !early(&self.vehicle);
+        let late_receiver =
+            !chain_shows && early(&self.wheel) && early(&self.brake) && !early(&self.vehicle);
         let all = [self.wheel, self.brake, self.vehicle];
         let asked = &all[..if late_receiver { 2 } else { 3 }];
         // A brake alone says as little of the drag as the drag does of it.
@@ -102,6 +105,24 @@ impl Timing {
         }
     }
 
+    /// Whether the wheel speed alone comes before the drag, and nothing shows a chain that would make it: a tyre does.
+    fn wheel_early(&self, chain_shows: bool) -> bool {
+        let in_step = |l: Late| l.value.abs() < IN_STEP_S + 2.0 * l.std;
+        let others = self.vehicle.std < VAGUE_S
+            && in_step(self.vehicle)
+            && (in_step(self.brake) || self.brake.std > HEARD_S);
+        let known = self.wheel.std < VAGUE_S;
+        !chain_shows && others && known && self.wheel.value < -LEAST_DRAG_LATE_S
+    }
+
+    /// Leaves the wheel speed as early as it is.
+    fn leave_wheel(&mut self) {
+        self.wheel_left = -self.wheel.value;
+        self.late.wheel = 0.0;
+        self.late.wheel_by_turn = 0.0;
+        self.wheel.value = 0.0;
+    }
+
     /// Whether the brake's reading comes before the torque does: by more than a filter or a logger out of step makes it,
     /// or by less where the speeds show that the loggers are in step.
     fn brake_early(&self) -> bool {
@@ -131,8 +152,8 @@ impl Timing {
         self.brake.value = 0.0;
     }
 
-    /// Leaves the drag as late, and the brake as early, as they are to be explained, or as another's timing did; by how
-    /// much the drag, and whether the brake.
+    /// Leaves the drag as late, the brake as early, or else the wheel speed as early, as they are to be explained, or as
+    /// another's timing did; by how much the drag, and whether the brake.
     fn leave_to_physics(&mut self, other: Option<&Self>, chain_shows: bool) -> (Option<f64>, bool) {
         let drag = other.map_or_else(
             || self.drag_late(chain_shows),
@@ -140,8 +161,15 @@ impl Timing {
         );
         self.leave(drag.unwrap_or(0.0));
         let brake = other.map_or_else(|| self.brake_early(), |other| other.leaves_brake);
+        let wheel = other.map_or_else(
+            || drag.is_none() && !brake && self.wheel_early(chain_shows),
+            |other| other.wheel_left > 0.0,
+        );
         if brake {
             self.leave_brake();
+        }
+        if wheel {
+            self.leave_wheel();
         }
         (drag, brake)
     }
@@ -156,7 +184,11 @@ impl Timing {
             .map(|late| late.value.abs() + UNKNOWN_STDS * late.std)
             .fold(0.0, f64::max);
         // A speed that hardly changes tells no lateness, and its own bends no slip.
-        let drag_s = [self.wheel, self.vehicle]
+        let wheel = Late {
+            value: self.wheel.value - self.wheel_left,
+            ..self.wheel
+        };
+        let drag_s = [wheel, self.vehicle]
             .into_iter()
             .filter(|late| late.std < VAGUE_S)
             .map(|late| UNKNOWN_STDS * late.std - self.against_drag(late).value)
@@ -171,6 +203,7 @@ impl Timing {
             channels_s,
             drag_s,
             brake_s,
+            left: self.drag > 0.0 || self.wheel_left > 0.0,
         }
     }
 }
@@ -185,6 +218,8 @@ pub struct Untold {
     pub drag_s: f64,
     /// How early the brake may be read.
     pub brake_s: f64,
+    /// Whether the drag was left late, or the wheel speed early, for want of a chain that would make it so.
+    pub left: bool,
 }
 
 impl Untold {
@@ -359,8 +394,8 @@ impl<'a> Recorded<'a> {
         None
     }
 
-    /// What is left to physics once the timing is found: a drag later than all others, or a brake's reading before its
-    /// torque, is to be told apart (delay, lag or what else keeps it back), so the channels are put back by that much.
+    /// What is left to physics once the timing is found: a drag later than all others, a brake's reading before its
+    /// torque, or a wheel speed that alone is early, is to be told apart (delay, lag or what else keeps it back), so the channels are put back by that much.
     /// An argument that starts from another's timing leaves what that did: it is to speak of the same question.
     fn left_to_physics(
         &self,
@@ -373,12 +408,17 @@ impl<'a> Recorded<'a> {
         timing.found = timing.late;
         timing.brake_heard = self.audit.brake_late.std.is_finite();
         let (drag, brake) = timing.leave_to_physics(start, self.audit.shows_a_chain());
-        if drag.is_some() || brake {
+        let wheel = timing.wheel_left > 0.0;
+        if drag.is_some() || brake || wheel {
             data = self.at_one_time(timing.late);
-            // What is to be explained is not to be explained away: a drag that two others say is late, or a brake.
+            // What is to be explained is not to be explained away: a drag that two others say is late, a brake, or a wheel
+            // speed, whose lateness by turn goes with the speed as a relaxation does.
             let both = drag.is_some() && timing.brake.std < VAGUE_S;
-            if both {
+            if both || wheel {
                 data.timing_std.wheel = LEAST_STD_S;
+            }
+            if wheel {
+                data.timing_std.wheel_by_turn = LEAST_STD_S;
             }
             if both || brake {
                 data.timing_std.brake = LEAST_STD_S;
@@ -457,6 +497,7 @@ fn known_to(audit: &Audit) -> TimingStd {
         wheel: std(&audit.wheel_late, nothing.wheel),
         vehicle: std(&audit.vehicle_late, nothing.vehicle),
         brake: std(&audit.brake_late, nothing.brake),
+        ..nothing
     }
 }
 
@@ -576,8 +617,40 @@ mod tests {
     }
 
     #[test]
+    fn a_wheel_that_alone_precedes_drag_and_vehicle_is_left_to_the_tyre() {
+        let mut early = timing(-0.004, 0.001, 0.0);
+        assert!(early.wheel_early(false) && !early.wheel_early(true));
+        let untold = early.untold();
+        (early.late.wheel, early.late.wheel_by_turn) = (-0.005, 0.001);
+        assert_eq!(early.leave_to_physics(None, false), (None, false));
+        assert_eq!(early.wheel.value, 0.0);
+        assert_eq!((early.late.wheel, early.late.wheel_by_turn), (0.0, 0.0));
+        assert!(early.untold().left && !untold.left);
+        // A tyre's memory is as long as before; the channels' is not.
+        assert_eq!(early.untold().drag_s, untold.drag_s);
+        assert!(early.untold().channels_s < 1e-3 && untold.channels_s > 4e-3);
+        // By less than a logger is out of step, beside others that are, or a vehicle's speed that says nothing.
+        assert!(!timing(-0.0015, 0.0, 0.0).wheel_early(false));
+        assert!(!timing(-0.004, 0.005, 0.0).wheel_early(false));
+        assert!(!timing(-0.004, 0.0, 0.005).wheel_early(false));
+        let mut vague = timing(-0.004, 0.0, 0.0);
+        vague.vehicle.std = 0.003;
+        assert!(!vague.wheel_early(false));
+        // Not alone: the brake is.
+        let mut with_brake = timing(-0.004, 0.0, -0.025);
+        assert_eq!(with_brake.leave_to_physics(None, false), (None, true));
+        assert_eq!(with_brake.wheel.value, -0.004);
+        // An argument by fewer runs does the same.
+        let mut fewer = timing(-0.001, 0.005, 0.0);
+        fewer.leave_to_physics(Some(&early), false);
+        assert_eq!((fewer.wheel.value, fewer.vehicle.value), (0.0, 0.005));
+    }
+
+    #[test]
     fn a_late_receiver_says_nothing_against_a_late_drag() {
         assert_eq!(timing(-0.010, 0.030, -0.011).drag_late(false), Some(0.010));
+        // Unless the drag's logger may be late, too.
+        assert_eq!(timing(-0.010, 0.030, -0.011).drag_late(true), None);
         // A filter of the drag's that the brake has, too.
         assert_eq!(timing(-0.010, 0.030, 0.000).drag_late(false), None);
         assert_eq!(timing(0.004, 0.030, -0.011).drag_late(false), None);

@@ -166,7 +166,7 @@ fn left_by_form(trial: &Trial, before: &TakenUp) -> bool {
     };
     before.names.iter().any(|&(other, weight)| {
         let small = trial.weight() < FORM_LEFT * weight;
-        small && other.aliases().iter().any(|alias| alias.with == id)
+        small && is_alias(id, other)
     })
 }
 
@@ -189,18 +189,40 @@ fn next<'a>(data: &Data, trials: &'a [Trial], before: &TakenUp) -> Option<&'a Tr
     });
     // Much more at the sensors' noise, too: what the runs' own differences hide of a name says nothing against it.
     let much_more = |own: f64, than: f64| own > DEPENDENCE_SHARE * than + DEPENDENCE_NATS;
-    let touched = |balance: Balance| {
-        let mechanism = named.mechanism();
-        mechanism
-            .is_some_and(|(_, entry)| data.catalogue.get(entry).guide().touches.contains(&balance))
+    let touches = |t: &Trial| {
+        let entry = t.mechanism().map(|(_, entry)| entry);
+        let all = entry.map_or(&[][..], |entry| data.catalogue.get(entry).guide().touches);
+        let formed = all.iter().copied().filter(|balance| data.forms(*balance));
+        formed.collect::<Vec<_>>()
     };
+    // An alias that accounts for what more balances show, and for much more, is what there is: one number fits all of them.
+    let of_named = touches(named);
+    let id = named.mechanism().map(|(id, _)| id);
+    let in_more_balances = |t: &&Trial| {
+        let own = t.mechanism().map(|(id, _)| id);
+        own.zip(id).is_some_and(|(own, id)| is_alias(own, id))
+            && wider(&touches(t), &of_named)
+            && much_more(t.at_sensors.0, named.at_sensors.0)
+    };
+    let named = standing().find(in_more_balances).unwrap_or(named);
+    let of_named = touches(named);
     let instead = |t: &&Trial| {
-        touched(t.claim.balance(data))
+        of_named.contains(&t.claim.balance(data))
             && much_more(t.weight(), named.weight())
             && much_more(t.at_sensors.0, named.at_sensors.0)
     };
     let mut free = standing().filter(|t| t.mechanism().is_none());
     Some(free.find(instead).unwrap_or(named))
+}
+
+/// Whether a name is an alias of another.
+fn is_alias(id: Id, of: Id) -> bool {
+    of.aliases().iter().any(|alias| alias.with == id)
+}
+
+/// Whether these balances are all of those, and more.
+fn wider(these: &[Balance], those: &[Balance]) -> bool {
+    these.len() > those.len() && those.iter().all(|balance| these.contains(balance))
 }
 
 /// What every round is held with.
@@ -254,12 +276,11 @@ impl Question<'_> {
             };
             let touches = data.catalogue.get(entry).guide().touches;
             let outweighed = |trial: &&mut Trial| {
-                let more = memory.weight() - trial.weight();
                 let named = trial.mechanism().is_some() && could_be_taken(trial);
                 named
                     && !trial.remembers
                     && touches.contains(&trial.claim.balance(data))
-                    && more > softness(memory.weight())
+                    && outweighs(&memory, trial)
             };
             let mut outweighed = trials.iter_mut().filter(outweighed).peekable();
             if outweighed.peek().is_none() {
@@ -273,6 +294,17 @@ impl Question<'_> {
             }
         }
     }
+}
+
+/// Whether more speaks for a memory of the chain's than for a name: clearly more, but where a chain leaves what looks like the
+/// name, too, for that has nothing but its weight to speak for it.
+fn outweighs(memory: &Trial, trial: &Trial) -> bool {
+    let least = if trial.fed_by_chain {
+        0.0
+    } else {
+        softness(memory.weight())
+    };
+    memory.weight() - trial.weight() > least
 }
 
 /// Names that a counter-form clearly outweighs: what there is of them is something else.
@@ -553,6 +585,76 @@ mod tests {
             10.0,
             Id::SlipHysteresis
         ));
+    }
+
+    #[test]
+    fn what_a_chain_leaves_too_is_outweighed_by_any_memory_of_the_chain_that_is_heavier() {
+        let data = stop(Noise::TYPICAL, 4);
+        let base = toy::settled(&data);
+        let of = |id, nats, fed_by_chain| Trial {
+            fed_by_chain,
+            ..of_name(&data, &base, id, nats, 3.0)
+        };
+        // Softness of 100 nats is 7.
+        let memory = of(Id::RelaxationLength, 100.0, true);
+        assert!(outweighs(&memory, &of(Id::SlipHysteresis, 99.0, true)));
+        assert!(!outweighs(&memory, &of(Id::SlipHysteresis, 101.0, true)));
+        assert!(!outweighs(&memory, &of(Id::LoadSensitivity, 94.0, false)));
+        assert!(outweighs(&memory, &of(Id::LoadSensitivity, 92.0, false)));
+    }
+
+    #[test]
+    fn several_runs_that_agree_on_the_drag_are_enough_where_no_chain_leaves_the_like() {
+        let data = stop(Noise::TYPICAL, 4);
+        let base = toy::settled(&data);
+        let wear = |t: f64, predicts: f64| Trial {
+            predicts,
+            at_sensors: (2.0, 1.0),
+            ..of_name(&data, &base, Id::WearDrift, 2.0, t)
+        };
+        assert!(stands(&wear(3.6, 0.32)) && needed(&wear(3.6, 0.32)));
+        let refused = [
+            wear(2.9, 0.32),
+            wear(3.6, 0.2),
+            // An inertia predicts no drag.
+            wear(3.6, f64::INFINITY),
+            Trial {
+                fed_by_chain: true,
+                ..wear(3.6, 0.32)
+            },
+            Trial {
+                runs: 3,
+                ..wear(3.6, 0.32)
+            },
+            Trial {
+                gain: -0.1,
+                ..wear(3.6, 0.32)
+            },
+        ];
+        assert!(refused.iter().all(|trial| !stands(trial) && !needed(trial)));
+    }
+
+    #[test]
+    fn one_parameter_that_two_balances_bear_out_comes_before_one_that_one_of_them_does() {
+        let data = stop(Noise::TYPICAL, 4);
+        let base = toy::settled(&data);
+        let first = |gain_at_sensors: f64, mass_at_sensors: f64| {
+            let at = |id, nats, at_sensors| Trial {
+                at_sensors: (at_sensors, 14.0),
+                ..of_name(&data, &base, id, nats, 3.0)
+            };
+            let mut trials = [
+                at(Id::VehicleInertia, 20.0, mass_at_sensors),
+                at(Id::ForceGain, 8.0, gain_at_sensors),
+            ];
+            rank(&data, &mut trials);
+            let taken = next(&data, &trials, &TakenUp::default()).unwrap();
+            taken.mechanism().unwrap().0
+        };
+        assert_eq!(first(1500.0, 900.0), Id::ForceGain);
+        // The wheel balance says nothing for it.
+        assert_eq!(first(900.0, 900.0), Id::VehicleInertia);
+        assert_eq!(first(900.0, 2500.0), Id::VehicleInertia);
     }
 
     #[test]

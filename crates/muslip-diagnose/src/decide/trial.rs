@@ -2,13 +2,14 @@
 
 use crate::chain::timing::Untold;
 use crate::constants::{
-    CLEARLY_PREDICTED, DEPENDENCE_WORTH, INDIFFERENT_NATS, LARGE_GAIN_AT_SENSORS,
-    LARGE_GAIN_OF_DEPENDENCE_AT_SENSORS, LARGE_GAIN_ON_UNSEEN, LEAST_EFFECT, LEAST_GAIN,
-    LEAST_GAIN_AT_SENSORS, LEAST_GAIN_OF_DEPENDENCE_AT_SENSORS, LEAST_MEMORY_S, LEAST_PREDICTED,
-    LEAST_PREDICTED_BY_DEPENDENCE, LEAST_T, LEAST_T_AT_SENSORS, LEAST_T_AT_SENSORS_NOT_FED,
-    LEAST_T_NOT_FED, LEAST_T_OF_DEPENDENCE, LEAST_T_OF_DEPENDENCE_AT_SENSORS, LEAST_T_OF_LARGE,
-    LEAST_T_OF_LIKELIER, LINED_UP_PREDICTED, LINED_UP_PREDICTED_BY_DEPENDENCE, MOST_AGAINST,
-    PRICE_OF_NAME, PRICE_OF_PARAMETER, REAL_MEMORY_PREDICTED, REAL_MEMORY_T,
+    CLEARLY_PREDICTED, DEPENDENCE_WORTH, FEWEST_RUNS_AGREED, INDIFFERENT_NATS,
+    LARGE_GAIN_AT_SENSORS, LARGE_GAIN_OF_DEPENDENCE_AT_SENSORS, LARGE_GAIN_ON_UNSEEN, LEAST_EFFECT,
+    LEAST_GAIN, LEAST_GAIN_AT_SENSORS, LEAST_GAIN_OF_DEPENDENCE_AT_SENSORS, LEAST_MEMORY_S,
+    LEAST_PREDICTED, LEAST_PREDICTED_BY_DEPENDENCE, LEAST_T, LEAST_T_AT_SENSORS,
+    LEAST_T_AT_SENSORS_NOT_FED, LEAST_T_NOT_FED, LEAST_T_OF_AGREED, LEAST_T_OF_DEPENDENCE,
+    LEAST_T_OF_DEPENDENCE_AT_SENSORS, LEAST_T_OF_LARGE, LEAST_T_OF_LIKELIER, LINED_UP_PREDICTED,
+    LINED_UP_PREDICTED_BY_DEPENDENCE, MOST_AGAINST, PRICE_OF_NAME, PRICE_OF_PARAMETER,
+    REAL_MEMORY_PREDICTED, REAL_MEMORY_T,
 };
 use crate::data::Data;
 use crate::innovations::dependence::Dependence;
@@ -264,11 +265,15 @@ impl<'a> Before<'a> {
             let mechanism = data.catalogue.get(entry);
             mechanism.owns(p, &data.context) && !mechanism.facts().counter_form
         });
-        let real = in_force && predicts > REAL_MEMORY_PREDICTED && at_sensors.1 > REAL_MEMORY_T;
+        let is_left = in_force && self.untold.left;
+        let alike = at_sensors.1 > REAL_MEMORY_T || is_left;
+        let real = in_force && predicts > REAL_MEMORY_PREDICTED && alike;
         let memory_s = term.and_then(|(id, entry, p)| {
             let memory_s = data.catalogue.get(entry).memory_s(p, &data.context)?;
-            Some((memory_s, least_memory_s(data, id, entry, real)))
+            Some((memory_s, least_memory_s(data, id, entry, real, is_left)))
         });
+        // No chain feeds a memory of what was left to be explained because none shows.
+        let explains_left = is_left && memory_s.is_some();
         // That a memory is real does not say whose it is: one of the tyre must outlast what it leaves to the chain.
         let of_tyre =
             term.is_some_and(|(_, entry, _)| data.catalogue.get(entry).guide().kind == Kind::Tyre);
@@ -298,7 +303,7 @@ impl<'a> Before<'a> {
             own,
             says_as_well: term
                 .and_then(|(_, entry, p)| data.catalogue.get(entry).says_as_well(p, &data.context)),
-            fed_by_chain: fed_by_chain == Some(true),
+            fed_by_chain: fed_by_chain == Some(true) && !explains_left,
             remembers: memory_s.is_some(),
             outlasts_chain: memory_s
                 .is_none_or(|(memory, least)| memory > least.max(chain_s) && memory < longest_s),
@@ -344,13 +349,15 @@ fn squares_by_best_law(data: &Data, judged: &Judged) -> Vec<f64> {
 /// Shortest memory in s that is named: a filtered reading of the brake holds less noise than the reading itself, which
 /// looks like a short lag, so there its descriptor's smallest useful effect holds. None is shorter than the recording's
 /// step, or half of it where it is real: how a reading changes between two samples is not known, but what it changes by
-/// from one to the next is. An acceleration takes two steps to be seen, with the torque that enters at both.
-fn least_memory_s(data: &Data, id: Id, entry: usize, real: bool) -> f64 {
+/// from one to the next is. An acceleration takes two steps to be seen, with the torque that enters at both. Of a drag that
+/// is `left` late to be explained the timing's errors are known.
+fn least_memory_s(data: &Data, id: Id, entry: usize, real: bool, left: bool) -> f64 {
     let (least_s, steps) = if id.balance() == Balance::Wheel {
         let smallest_s = (data.catalogue.get(entry).guide().smallest_size)(&data.context);
         (smallest_s, 2.0)
     } else {
-        (LEAST_MEMORY_S, if real { 0.5 } else { 1.0 })
+        let least_s = if left { 0.0 } else { LEAST_MEMORY_S };
+        (least_s, if real { 0.5 } else { 1.0 })
     };
     least_s.max(steps * data.context.dt / data.averaged as f64)
 }
@@ -368,15 +375,21 @@ fn could_be_named(trial: &Trial) -> bool {
     large && trial.own && not_of_chain && trial.predicts > LEAST_PREDICTED
 }
 
+/// Gain from which a trial that unseen runs bear out is seen, nats.
+fn least_gain(trial: &Trial) -> f64 {
+    if trial.mechanism().is_none() {
+        DEPENDENCE_WORTH * worth(trial)
+    } else if unseen_runs_agree(trial) {
+        0.0
+    } else {
+        LEAST_GAIN
+    }
+}
+
 /// Whether a trial stands.
 #[must_use]
 pub fn stands(trial: &Trial) -> bool {
-    let least_gain = if trial.mechanism().is_some() {
-        LEAST_GAIN
-    } else {
-        DEPENDENCE_WORTH * worth(trial)
-    };
-    let seen = trial.gain > least_gain && seen_on_unseen_runs(trial);
+    let seen = trial.gain > least_gain(trial) && seen_on_unseen_runs(trial);
     (seen || hidden(trial)) && could_be_named(trial)
 }
 
@@ -388,6 +401,13 @@ fn hidden(trial: &Trial) -> bool {
     trial.first && gains && seen_at_sensors(trial)
 }
 
+/// Whether what unseen runs say is enough by itself: several, alike, of the drag, and of what no measuring chain leaves.
+fn unseen_runs_agree(trial: &Trial) -> bool {
+    let (mean, t) = trial.unseen;
+    let alike = trial.runs >= FEWEST_RUNS_AGREED && mean > 0.0 && t > LEAST_T_OF_AGREED;
+    alike && !trial.fed_by_chain && lowers_drag_s_error(trial.predicts, CLEARLY_PREDICTED)
+}
+
 /// Whether a trial is as good as one that stands but for how alike unseen runs speak for it.
 #[must_use]
 pub fn could_stand(trial: &Trial) -> bool {
@@ -397,7 +417,8 @@ pub fn could_stand(trial: &Trial) -> bool {
 /// Whether unseen runs gain, alike or not.
 fn gains_on_unseen_runs(trial: &Trial) -> bool {
     let (mean, t) = trial.unseen;
-    trial.gain > LEAST_GAIN && mean > 0.0 && t > LEAST_T_OF_LIKELIER
+    let least = least_gain(trial).min(LEAST_GAIN);
+    trial.gain > least && mean > 0.0 && t > LEAST_T_OF_LIKELIER
 }
 
 /// Whether a name is of use beside others that were named: whatever it is worth alone was settled when it was taken up.

@@ -262,7 +262,7 @@ pub fn nuisances(data: &Data, slopes: &Slopes, run: usize) -> Vec<(f64, Triple)>
         (late.brake, chain.columns([None, Some(&braked), None])),
         // Wheel speed late by turn.
         (
-            0.001,
+            late.wheel_by_turn,
             chain.by_wheel(|k| wheel_rate[k] * mean / s.wheel.smooth[k].abs().max(0.1 * mean)),
         ),
         // Force smoothed, 6 ms.
