@@ -187,25 +187,11 @@ fn next<'a>(data: &Data, trials: &'a [Trial], before: &TakenUp) -> Option<&'a Tr
         let apart = likeliest.weight() - named.weight() > softness(likeliest.weight());
         if apart { likeliest } else { named }
     });
+    let named = standing()
+        .find(|t| in_more_balances(data, t, named))
+        .unwrap_or(named);
     // Much more at the sensors' noise, too: what the runs' own differences hide of a name says nothing against it.
-    let much_more = |own: f64, than: f64| own > DEPENDENCE_SHARE * than + DEPENDENCE_NATS;
-    let touches = |t: &Trial| {
-        let entry = t.mechanism().map(|(_, entry)| entry);
-        let all = entry.map_or(&[][..], |entry| data.catalogue.get(entry).guide().touches);
-        let formed = all.iter().copied().filter(|balance| data.forms(*balance));
-        formed.collect::<Vec<_>>()
-    };
-    // An alias that accounts for what more balances show, and for much more, is what there is: one number fits all of them.
-    let of_named = touches(named);
-    let id = named.mechanism().map(|(id, _)| id);
-    let in_more_balances = |t: &&Trial| {
-        let own = t.mechanism().map(|(id, _)| id);
-        own.zip(id).is_some_and(|(own, id)| is_alias(own, id))
-            && wider(&touches(t), &of_named)
-            && much_more(t.at_sensors.0, named.at_sensors.0)
-    };
-    let named = standing().find(in_more_balances).unwrap_or(named);
-    let of_named = touches(named);
+    let of_named = touches(data, named);
     let instead = |t: &&Trial| {
         of_named.contains(&t.claim.balance(data))
             && much_more(t.weight(), named.weight())
@@ -213,6 +199,29 @@ fn next<'a>(data: &Data, trials: &'a [Trial], before: &TakenUp) -> Option<&'a Tr
     };
     let mut free = standing().filter(|t| t.mechanism().is_none());
     Some(free.find(instead).unwrap_or(named))
+}
+
+/// Whether one gain is so much more than another that the other's form does not make up for it.
+fn much_more(own: f64, than: f64) -> bool {
+    own > DEPENDENCE_SHARE * than + DEPENDENCE_NATS
+}
+
+/// Balances that a name touches, of those that the recordings form.
+fn touches(data: &Data, trial: &Trial) -> Vec<Balance> {
+    let entry = trial.mechanism().map(|(_, entry)| entry);
+    let all = entry.map_or(&[][..], |entry| data.catalogue.get(entry).guide().touches);
+    let formed = all.iter().copied().filter(|balance| data.forms(*balance));
+    formed.collect()
+}
+
+/// Whether a trial is of an alias of a name that accounts for what more balances show, and for much more: one number fits
+/// all of them.
+fn in_more_balances(data: &Data, trial: &Trial, named: &Trial) -> bool {
+    let (Some((id, _)), Some((of, _))) = (trial.mechanism(), named.mechanism()) else {
+        return false;
+    };
+    let wider = || wider(&touches(data, trial), &touches(data, named));
+    is_alias(id, of) && much_more(trial.at_sensors.0, named.at_sensors.0) && wider()
 }
 
 /// Whether a name is an alias of another.

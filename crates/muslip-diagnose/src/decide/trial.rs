@@ -189,6 +189,20 @@ fn unanimous(gains: &[f64]) -> bool {
     gains.len() > 1 && sum_of(-1.0) < MOST_AGAINST * sum_of(1.0)
 }
 
+/// A memory, beside what the chain remembers.
+struct Remembered {
+    /// Whether it is longer than what the chain's own timing was off by, and no longer than the channels show.
+    outlasts_chain: bool,
+    /// Whether it is of what the timing left to be explained.
+    of_left: bool,
+}
+
+/// The term of a claim in the model that has it, where it is a mechanism.
+fn term_of<'a>(claim: &Claim, judged: &'a Judged) -> Option<&'a Term> {
+    let (_, entry) = claim.mechanism()?;
+    judged.model.terms.iter().find(|t| t.entry == entry)
+}
+
 /// The model so far, as what a trial adds to it is weighed against it.
 pub struct Before<'a> {
     data: &'a Data,
@@ -231,25 +245,9 @@ impl<'a> Before<'a> {
         let per_run = claim.is_per_run(data);
         let counts = judged.grams.iter().flatten().map(|g| g.count);
         let readings = counts.sum::<usize>() / judged.parts.len().max(1);
-        let balance = claim.balance(data);
-        let fed_by_chain = claim
-            .mechanism()
-            .map(|(_, entry)| data.catalogue.get(entry).fed_by_chain());
-        let leaves_alike = |term: &Term| {
-            let mechanism = data.catalogue.get(term.entry);
-            let remembers = mechanism
-                .memory_s(&term.parameters, &data.context)
-                .is_some();
-            may_leave(remembers && mechanism.facts().through_force, fed_by_chain)
-        };
-        let named = base.model.terms.iter().any(|t| {
-            let term = data.catalogue.get(t.entry);
-            term.id().balance() == balance
-                && (balance != Balance::Tyre || term.facts().through_force)
-                && leaves_alike(t)
-        });
-        let in_force = claim.works_through_force(data);
-        let predicts = if in_force {
+        let mechanism = claim.mechanism();
+        let fed_by_chain = mechanism.map(|(_, entry)| data.catalogue.get(entry).fed_by_chain());
+        let predicts = if claim.works_through_force(data) {
             self.predicted_better(&judged)
         } else {
             f64::INFINITY
@@ -257,63 +255,82 @@ impl<'a> Before<'a> {
         let own_gains = gains(&base.unseen, &judged.unseen, per_run);
         let gains_at_sensors = self.gains_at_sensors(&judged, per_run);
         let at_sensors = sum_and_t(&gains_at_sensors);
-        let term = claim.mechanism().and_then(|(id, entry)| {
-            let term = judged.model.terms.iter().find(|t| t.entry == entry)?;
-            Some((id, entry, term.parameters.as_slice()))
+        let term = term_of(&claim, &judged);
+        let own = term.is_none_or(|term| {
+            let mechanism = data.catalogue.get(term.entry);
+            mechanism.owns(&term.parameters, &data.context) && !mechanism.facts().counter_form
         });
-        let own = term.is_none_or(|(_, entry, p)| {
-            let mechanism = data.catalogue.get(entry);
-            mechanism.owns(p, &data.context) && !mechanism.facts().counter_form
-        });
-        let is_left = in_force && self.untold.left;
-        let alike = at_sensors.1 > REAL_MEMORY_T || is_left;
-        let real = in_force && predicts > REAL_MEMORY_PREDICTED && alike;
-        let memory_s = term.and_then(|(id, entry, p)| {
-            let memory_s = data.catalogue.get(entry).memory_s(p, &data.context)?;
-            Some((memory_s, least_memory_s(data, id, entry, real, is_left)))
-        });
-        // No chain feeds a memory of what was left to be explained because none shows.
-        let explains_left = is_left && memory_s.is_some();
-        // That a memory is real does not say whose it is: one of the tyre must outlast what it leaves to the chain.
-        let of_tyre =
-            term.is_some_and(|(_, entry, _)| data.catalogue.get(entry).guide().kind == Kind::Tyre);
-        let shortest_s = [
-            (!real).then_some(self.untold.channels_s),
-            of_tyre.then(|| self.untold.shortest_of_tyre_s()),
-        ];
-        let chain_s = shortest_s.into_iter().flatten().fold(0.0, f64::max);
-        let of_brake = term.is_some_and(|(_, entry, _)| {
-            let guide = data.catalogue.get(entry).guide();
-            guide.kind == Kind::Wheel && guide.memory == Memory::Kernel
-        });
-        let longest_s = if of_brake {
-            self.untold.longest_of_brake_s()
-        } else {
-            f64::INFINITY
-        };
+        let remembered = term.and_then(|term| self.remembered(term, predicts, at_sensors.1));
+        let of_left = remembered.as_ref().is_some_and(|memory| memory.of_left);
         let price = PRICE_OF_PARAMETER * free + PRICE_OF_NAME;
         Trial {
-            claim,
             gain: base.loss - judged.loss - price,
             price,
             unseen: mean_and_t(&own_gains),
             runs: own_gains.len(),
-            first: !named || at_sensors.0 > self.taken_up,
+            first: !self.is_named_before(&claim, fed_by_chain) || at_sensors.0 > self.taken_up,
             at_sensors,
             own,
-            says_as_well: term
-                .and_then(|(_, entry, p)| data.catalogue.get(entry).says_as_well(p, &data.context)),
-            fed_by_chain: fed_by_chain == Some(true) && !explains_left,
-            remembers: memory_s.is_some(),
-            outlasts_chain: memory_s
-                .is_none_or(|(memory, least)| memory > least.max(chain_s) && memory < longest_s),
+            says_as_well: term.and_then(|term| {
+                let mechanism = data.catalogue.get(term.entry);
+                mechanism.says_as_well(&term.parameters, &data.context)
+            }),
+            // No chain feeds a memory of what was left to be explained because none shows.
+            fed_by_chain: fed_by_chain == Some(true) && !of_left,
+            remembers: remembered.is_some(),
+            outlasts_chain: remembered.is_none_or(|memory| memory.outlasts_chain),
             beside_chain: true,
             predicts,
             readings,
             size,
             unanimous: [&own_gains, &gains_at_sensors].map(|gains| unanimous(gains)),
             judged: judged.without_columns(),
+            claim,
         }
+    }
+
+    /// Whether something of a claim's balance is named already that may have left what the claim is of.
+    fn is_named_before(&self, claim: &Claim, fed_by_chain: Option<bool>) -> bool {
+        let data = self.data;
+        let balance = claim.balance(data);
+        self.judged.model.terms.iter().any(|term| {
+            let mechanism = data.catalogue.get(term.entry);
+            let memory_s = mechanism.memory_s(&term.parameters, &data.context);
+            let through_force = mechanism.facts().through_force;
+            mechanism.id().balance() == balance
+                && (balance != Balance::Tyre || through_force)
+                && may_leave(memory_s.is_some() && through_force, fed_by_chain)
+        })
+    }
+
+    /// What a term remembers beside the chain, where it is a memory; by how much better it predicts the drag, and the t of
+    /// the gains' roots at the sensors' noise.
+    fn remembered(&self, term: &Term, predicts: f64, t_at_sensors: f64) -> Option<Remembered> {
+        let data = self.data;
+        let mechanism = data.catalogue.get(term.entry);
+        let memory_s = mechanism.memory_s(&term.parameters, &data.context)?;
+        let in_force = mechanism.facts().through_force;
+        let of_left = in_force && self.untold.left;
+        let alike = t_at_sensors > REAL_MEMORY_T || of_left;
+        let real = in_force && predicts > REAL_MEMORY_PREDICTED && alike;
+        let least_s = least_memory_s(data, term.entry, real, of_left);
+        // That a memory is real does not say whose it is: one of the tyre must outlast what it leaves to the chain.
+        let guide = mechanism.guide();
+        let shortest_s = [
+            (!real).then_some(self.untold.channels_s),
+            (guide.kind == Kind::Tyre).then(|| self.untold.shortest_of_tyre_s()),
+        ];
+        let chain_s = shortest_s.into_iter().flatten().fold(0.0, f64::max);
+        let of_brake = guide.kind == Kind::Wheel && guide.memory == Memory::Kernel;
+        let longest_s = if of_brake {
+            self.untold.longest_of_brake_s()
+        } else {
+            f64::INFINITY
+        };
+        Some(Remembered {
+            outlasts_chain: memory_s > least_s.max(chain_s) && memory_s < longest_s,
+            of_left,
+        })
     }
 
     fn gains_at_sensors(&self, with: &Judged, per_run: bool) -> Vec<f64> {
@@ -351,9 +368,10 @@ fn squares_by_best_law(data: &Data, judged: &Judged) -> Vec<f64> {
 /// step, or half of it where it is real: how a reading changes between two samples is not known, but what it changes by
 /// from one to the next is. An acceleration takes two steps to be seen, with the torque that enters at both. Of a drag that
 /// is `left` late to be explained the timing's errors are known.
-fn least_memory_s(data: &Data, id: Id, entry: usize, real: bool, left: bool) -> f64 {
-    let (least_s, steps) = if id.balance() == Balance::Wheel {
-        let smallest_s = (data.catalogue.get(entry).guide().smallest_size)(&data.context);
+fn least_memory_s(data: &Data, entry: usize, real: bool, left: bool) -> f64 {
+    let mechanism = data.catalogue.get(entry);
+    let (least_s, steps) = if mechanism.id().balance() == Balance::Wheel {
+        let smallest_s = (mechanism.guide().smallest_size)(&data.context);
         (smallest_s, 2.0)
     } else {
         let least_s = if left { 0.0 } else { LEAST_MEMORY_S };
