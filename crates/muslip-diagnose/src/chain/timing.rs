@@ -46,6 +46,11 @@ pub struct Timing {
     wheel_left: f64,
 }
 
+/// Whether a channel is as late as the drag, as far as is known.
+fn in_step(late: Late) -> bool {
+    late.value.abs() < IN_STEP_S + 2.0 * late.std
+}
+
 impl Timing {
     /// A channel's lateness against the drag as recorded.
     #[must_use]
@@ -107,7 +112,6 @@ impl Timing {
 
     /// Whether the wheel speed alone comes before the drag, and nothing shows a chain that would make it: a tyre does.
     fn wheel_early(&self, chain_shows: bool) -> bool {
-        let in_step = |l: Late| l.value.abs() < IN_STEP_S + 2.0 * l.std;
         let others = self.vehicle.std < VAGUE_S
             && in_step(self.vehicle)
             && (in_step(self.brake) || self.brake.std > HEARD_S);
@@ -127,7 +131,6 @@ impl Timing {
     /// or by less where the speeds show that the loggers are in step.
     fn brake_early(&self) -> bool {
         let [wheel, vehicle] = [self.wheel, self.vehicle].map(|late| self.against_drag(late));
-        let in_step = |l: Late| l.value.abs() < IN_STEP_S + 2.0 * l.std;
         let same_time =
             wheel.std < IN_STEP_S && in_step(wheel) && (in_step(vehicle) || vehicle.std > HEARD_S);
         let least = if same_time {
@@ -395,8 +398,9 @@ impl<'a> Recorded<'a> {
     }
 
     /// What is left to physics once the timing is found: a drag later than all others, a brake's reading before its
-    /// torque, or a wheel speed that alone is early, is to be told apart (delay, lag or what else keeps it back), so the channels are put back by that much.
-    /// An argument that starts from another's timing leaves what that did: it is to speak of the same question.
+    /// torque, or a wheel speed that alone is early, is to be told apart (delay, lag or what else keeps it back), so the
+    /// channels are put back by that much. An argument that starts from another's timing leaves what that did: it is to speak
+    /// of the same question.
     fn left_to_physics(
         &self,
         mut data: Data,

@@ -280,15 +280,12 @@ impl Question<'_> {
             .cloned()
             .collect();
         for memory in memories {
-            let Some((_, entry)) = memory.mechanism() else {
-                continue;
-            };
-            let touches = data.catalogue.get(entry).guide().touches;
+            let of_memory = touches(data, &memory);
             let outweighed = |trial: &&mut Trial| {
                 let named = trial.mechanism().is_some() && could_be_taken(trial);
                 named
                     && !trial.remembers
-                    && touches.contains(&trial.claim.balance(data))
+                    && of_memory.contains(&trial.claim.balance(data))
                     && outweighs(&memory, trial)
             };
             let mut outweighed = trials.iter_mut().filter(outweighed).peekable();

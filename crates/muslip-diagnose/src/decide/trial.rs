@@ -393,11 +393,9 @@ fn could_be_named(trial: &Trial) -> bool {
     large && trial.own && not_of_chain && trial.predicts > LEAST_PREDICTED
 }
 
-/// Gain from which a trial that unseen runs bear out is seen, nats.
-fn least_gain(trial: &Trial) -> f64 {
-    if trial.mechanism().is_none() {
-        DEPENDENCE_WORTH * worth(trial)
-    } else if unseen_runs_agree(trial) {
+/// Gain from which a name that unseen runs bear out is seen, nats.
+fn least_gain_of_name(trial: &Trial) -> f64 {
+    if unseen_runs_agree(trial) {
         0.0
     } else {
         LEAST_GAIN
@@ -407,7 +405,12 @@ fn least_gain(trial: &Trial) -> f64 {
 /// Whether a trial stands.
 #[must_use]
 pub fn stands(trial: &Trial) -> bool {
-    let seen = trial.gain > least_gain(trial) && seen_on_unseen_runs(trial);
+    let least_gain = if trial.mechanism().is_some() {
+        least_gain_of_name(trial)
+    } else {
+        DEPENDENCE_WORTH * worth(trial)
+    };
+    let seen = trial.gain > least_gain && seen_on_unseen_runs(trial);
     (seen || hidden(trial)) && could_be_named(trial)
 }
 
@@ -435,8 +438,7 @@ pub fn could_stand(trial: &Trial) -> bool {
 /// Whether unseen runs gain, alike or not.
 fn gains_on_unseen_runs(trial: &Trial) -> bool {
     let (mean, t) = trial.unseen;
-    let least = least_gain(trial).min(LEAST_GAIN);
-    trial.gain > least && mean > 0.0 && t > LEAST_T_OF_LIKELIER
+    trial.gain > least_gain_of_name(trial) && mean > 0.0 && t > LEAST_T_OF_LIKELIER
 }
 
 /// Whether a name is of use beside others that were named: whatever it is worth alone was settled when it was taken up.
