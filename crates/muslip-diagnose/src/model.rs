@@ -236,6 +236,60 @@ pub fn tyre<T: Listed>(
     state
 }
 
+/// Stages between the slip and the reading at which filters stand, in their order.
+const FILTERED_AT: [Stage; 5] = [
+    Stage::Slip,
+    Stage::Contact,
+    Stage::Structure,
+    Stage::Filter,
+    Stage::Line,
+];
+
+/// Whether a model's force passes a filter on its way to the reading.
+pub fn is_filtered(catalogue: &Catalogue, model: &Model) -> bool {
+    let mut terms = model.terms.iter();
+    terms.any(|term| catalogue.get(term.entry).facts().filters)
+}
+
+/// What a model's filters leave of a change of the force in N, as long as the series, where the reading is taken. A change
+/// of the slip passes them as the change of the force that it makes.
+pub fn filtered(
+    catalogue: &Catalogue,
+    model: &Model,
+    series: &Series,
+    context: &Context,
+    mut change: Vec<f64>,
+) -> Vec<f64> {
+    let mut state = State::empty();
+    let filters = |stage: Stage| {
+        model.terms.iter().filter(move |term| {
+            let facts = catalogue.get(term.entry).facts();
+            facts.filters && facts.stage == stage
+        })
+    };
+    for stage in FILTERED_AT {
+        for term in filters(stage) {
+            let of_slip = stage == Stage::Slip;
+            let passing = |state: &mut State<f64>| {
+                core::mem::take(if of_slip {
+                    &mut state.slip
+                } else {
+                    &mut state.force
+                })
+            };
+            if of_slip {
+                state.slip = change;
+            } else {
+                state.force = change;
+            }
+            let mechanism = f64::entry(catalogue, term.entry);
+            mechanism.apply(&term.parameters, series, context, &mut state);
+            change = passing(&mut state);
+        }
+    }
+    change
+}
+
 /// What the terms make of a wheel or a vehicle on which nothing acts but the brake torque as smoothed.
 pub fn acting<T: Listed>(
     catalogue: &Catalogue,
@@ -333,4 +387,53 @@ pub fn vehicle<T: Listed>(
             + state.opposing[k]
     };
     imbalance(context.mass, &series.speed.raw, &series.dt, force)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::innovations::toy::{Noise, stop};
+
+    #[test]
+    fn what_is_called_a_filter_is_linear_and_adds_nothing_of_its_own() {
+        let data = stop(Noise::NONE, 1);
+        let series = &data.series[0];
+        let wave = |hz: f64| -> Vec<f64> {
+            let phase = |t: &f64| core::f64::consts::TAU * hz * t;
+            series.time.iter().map(|t| phase(t).sin()).collect()
+        };
+        let (slow, fast) = (wave(0.7), wave(6.0));
+        let mut filters = 0;
+        for (entry, mechanism) in data.catalogue.entries().iter().enumerate() {
+            if !mechanism.facts().filters {
+                continue;
+            }
+            filters += 1;
+            let id = mechanism.id();
+            let mut model = Model::of_law(0.8, 0.12);
+            let parameters = mechanism.parameters(&data.context);
+            model.terms.push(Term {
+                entry,
+                parameters: parameters.iter().map(|p| f64::max(p.low, 0.02)).collect(),
+            });
+            let passed = |x: Vec<f64>| filtered(&data.catalogue, &model, series, &data.context, x);
+            let both = core::iter::zip(&slow, &fast).map(|(s, f)| 3.0 * s - 2.0 * f);
+            let both = passed(both.collect());
+            let alone = [&slow, &fast].map(|wave| passed(wave.clone()));
+            assert!(alone[1] != fast, "{id:?} does nothing");
+            let [slow, fast] = alone;
+            for k in 0..both.len() {
+                let sum = 3.0 * slow[k] - 2.0 * fast[k];
+                assert!(
+                    (both[k] - sum).abs() < 1e-9,
+                    "{id:?} {k}: {} {sum}",
+                    both[k]
+                );
+            }
+            let nothing = passed(vec![0.0; series.len()]);
+            assert!(nothing.iter().all(|x| *x == 0.0), "{id:?}");
+            assert!(is_filtered(&data.catalogue, &model));
+        }
+        assert!(filters >= 6, "{filters}");
+    }
 }

@@ -99,7 +99,7 @@ pub fn table(
             }
             OfRun {
                 columns: all.iter().map(|own| means(data, run, own)).collect(),
-                nuisances: nuisances(data, slopes, run),
+                nuisances: nuisances(data, model, slopes, run),
                 // What candidates change.
                 here: (!starts.is_empty()).then(|| all.swap_remove(0)),
             }

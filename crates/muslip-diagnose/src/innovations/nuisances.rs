@@ -4,6 +4,7 @@ use super::noise::Slopes;
 use super::rows::{Triple, quiet_force};
 use crate::data::Data;
 use crate::mechanism::Balance;
+use crate::model::{Model, filtered, is_filtered};
 use crate::number::finite_or_zero;
 use crate::prepare::mean_twice_about;
 use crate::series::Series;
@@ -52,6 +53,18 @@ fn poles_for_delay(time: &[f64], dt: &[f64], force: &[f64], late: f64, poles: us
         .collect()
 }
 
+/// Integral over time of what has a value at each sample; where that is none, of nothing.
+fn integral(dt: &[f64], x: impl Fn(usize) -> f64) -> Vec<f64> {
+    let mut sum = 0.0;
+    let steps = dt.iter().enumerate().map(|(k, dt)| x(k) * dt.min(0.1));
+    steps
+        .map(|step| {
+            sum += finite_or_zero(step);
+            sum
+        })
+        .collect()
+}
+
 /// A column at so many s after each sample, the last value beyond its end.
 fn at_times(time: &[f64], x: &[f64], after: f64) -> Vec<f64> {
     let last = time.len().saturating_sub(1);
@@ -76,6 +89,7 @@ fn at_times(time: &[f64], x: &[f64], after: f64) -> Vec<f64> {
 /// The chain on one run: what its columns are made of.
 struct Chain<'a> {
     data: &'a Data,
+    model: &'a Model,
     series: &'a Series,
     slopes: &'a Slopes,
     run: usize,
@@ -88,11 +102,12 @@ struct Chain<'a> {
 type Entry<'a> = &'a dyn Fn(usize) -> f64;
 
 impl<'a> Chain<'a> {
-    fn new(data: &'a Data, slopes: &'a Slopes, run: usize) -> Self {
+    fn new(data: &'a Data, model: &'a Model, slopes: &'a Slopes, run: usize) -> Self {
         let series = &data.series[run];
         let finite = |rate: &[f64]| rate.iter().map(|x| finite_or_zero(*x)).collect();
         Self {
             data,
+            model,
             series,
             slopes,
             run,
@@ -102,16 +117,31 @@ impl<'a> Chain<'a> {
     }
 
     /// Means over the blocks of what stands in each balance, sample by sample, where the balance is formed; nothing
-    /// where it stands in none.
+    /// where it stands in none. What stands in the tyre's is a change of the force in the contact.
     fn columns(&self, entries: [Option<Entry<'_>>; 3]) -> Triple {
         let blocks = &self.data.blocks[self.run];
         let balances = [Balance::Tyre, Balance::Wheel, Balance::Vehicle];
         core::array::from_fn(|b| match entries[b] {
             Some(entry) if !self.series.segments(balances[b]).is_empty() => {
-                blocks[b].mean_of(|k| finite_or_zero(entry(k)))
+                let entry = |k: usize| finite_or_zero(entry(k));
+                if balances[b] == Balance::Tyre && is_filtered(&self.data.catalogue, self.model) {
+                    let read = self.filtered((0..self.series.len()).map(entry).collect());
+                    blocks[b].mean_of(|k| read[k])
+                } else {
+                    blocks[b].mean_of(entry)
+                }
             }
             _ => Vec::new(),
         })
+    }
+
+    /// What the model's filters leave of a change of the force in the contact: an error of the slip comes as late to the
+    /// reading as the force that it makes.
+    fn filtered(&self, change: Vec<f64>) -> Vec<f64> {
+        let Data {
+            catalogue, context, ..
+        } = self.data;
+        filtered(catalogue, self.model, self.series, context, change)
     }
 
     /// Where the wheel speed reads so much less.
@@ -128,6 +158,23 @@ impl<'a> Chain<'a> {
         self.columns([Some(&|k| -slope[k] * u(k)), None, Some(&|k| mass * u(k))])
     }
 
+    /// Where the force in the contact is so much less. Wheel and vehicle move as well where it passes filters: by what these
+    /// hold back of it.
+    fn by_contact(&self, less: impl Fn(usize) -> f64) -> Triple {
+        if !is_filtered(&self.data.catalogue, self.model) {
+            return self.columns([Some(&less), None, None]);
+        }
+        let s = self.series;
+        let read = self.filtered((0..s.len()).map(&less).collect());
+        let held_back = integral(&s.dt, |k| less(k) - read[k]);
+        let radius = self.data.context.radius;
+        self.columns([
+            Some(&less),
+            Some(&|k| radius * held_back[k]),
+            Some(&|k| -held_back[k]),
+        ])
+    }
+
     /// Zero-phase: what inputs and reading differ by in bandwidth, and what smoothing leaves of the slip's noise.
     fn by_force(&self, reach: f64) -> Triple {
         let s = self.series;
@@ -137,7 +184,7 @@ impl<'a> Chain<'a> {
             *force -= beside;
         }
         let mean = mean_twice_about(&s.time, &force, &s.tyre, reach);
-        self.columns([Some(&|k| force[k] - mean[k]), None, None])
+        self.by_contact(|k| finite_or_zero(force[k] - mean[k]))
     }
 
     /// A mean over noisy slip is not the law at the mean slip: half its second derivative times the noise's variance.
@@ -181,16 +228,7 @@ impl<'a> Chain<'a> {
     fn smoothed_away(&self, x: &[f64], reach: f64) -> Vec<f64> {
         let s = self.series;
         let mean = self.smoothed(x, reach);
-        let mut sum = 0.0;
-        (0..s.len())
-            .map(|k| {
-                let d = (x[k] - mean[k]) * s.dt[k].min(0.1);
-                if d.is_finite() {
-                    sum += d;
-                }
-                sum
-            })
-            .collect()
+        integral(&s.dt, |k| x[k] - mean[k])
     }
 
     /// The brake smoothed, where it is integrated. A lag of the brake filters its reading's noise, and must find that
@@ -243,8 +281,8 @@ impl<'a> Chain<'a> {
 }
 
 /// The columns on one run as means over blocks, with the prior standard deviations of their coefficients.
-pub fn nuisances(data: &Data, slopes: &Slopes, run: usize) -> Vec<(f64, Triple)> {
-    let chain = Chain::new(data, slopes, run);
+pub fn nuisances(data: &Data, model: &Model, slopes: &Slopes, run: usize) -> Vec<(f64, Triple)> {
+    let chain = Chain::new(data, model, slopes, run);
     let s = chain.series;
     let (wheel_rate, speed_rate) = (&chain.wheel_rate, &chain.speed_rate);
     let wheel_second = second(wheel_rate, &s.time);
@@ -297,7 +335,8 @@ pub fn nuisances(data: &Data, slopes: &Slopes, run: usize) -> Vec<(f64, Triple)>
 mod tests {
     use super::*;
     use crate::innovations::hypothesis::{Beside, judge_added};
-    use crate::innovations::toy::{EFFORT, Lags, Noise, settled, stop_with, with_term};
+    use crate::innovations::rows::rows_of;
+    use crate::innovations::toy::{EFFORT, Lags, Noise, settled, stop, stop_with, with_term};
     use crate::mechanism::Id;
 
     /// What a lag of the brake gains in nats, no price taken off, and its time constant in s.
@@ -323,6 +362,45 @@ mod tests {
         });
         assert!(gain > 30.0, "{gain} nats, {time_s} s");
         assert!((time_s - 0.02).abs() < 0.004, "{time_s} s");
+    }
+
+    #[test]
+    fn a_change_of_the_force_stands_in_each_balance_as_a_filtered_model_has_it() {
+        let plain = stop(Noise::FINE_WHEEL, 2);
+        let base = settled(&plain);
+        for (id, time_s) in [(Id::ForceDelay, 0.02), (Id::ForceLag, 0.02)] {
+            let model = with_term(&plain, &base, id, time_s);
+            let change: Vec<f64> = plain.series[0]
+                .time
+                .iter()
+                .map(|t| 100.0 * (20.0 * t).sin())
+                .collect();
+            // The other way: rows of the model whose force is less by the change.
+            let mut less = plain.clone();
+            less.series[0].beside_law.clone_from(&change);
+            let [before, after] = [&plain, &less].map(|data| rows_of(data, &model, 0));
+            let slopes = Slopes::new(&plain, &model);
+            let columns = Chain::new(&plain, &model, &slopes, 0).by_contact(|k| change[k]);
+            for (b, balance) in [Balance::Tyre, Balance::Wheel, Balance::Vehicle]
+                .into_iter()
+                .enumerate()
+            {
+                let (before, after) = (before.of(balance), after.of(balance));
+                assert!(!after.is_empty(), "{balance:?} is not formed");
+                let moved = plain.blocks[0][b].mean_of(|k| after[k] - before[k]);
+                let most = moved.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
+                assert!(most > 0.0, "{id:?} {balance:?}");
+                // A sum over steps is half a step of 5 ms late beside one over their trapezoids.
+                let least = if b == 0 { 1e-9 } else { 0.5 * 5e-3 * 20.0 };
+                for (column, moved) in columns[b].iter().zip(&moved) {
+                    let off = (column - moved).abs();
+                    assert!(
+                        off < 1.1 * least * most,
+                        "{id:?} {balance:?} {column} {moved}"
+                    );
+                }
+            }
+        }
     }
 
     #[test]

@@ -173,6 +173,8 @@ pub struct Facts {
     pub counter_form: bool,
     /// Whether it is rare beside what recordings hardly tell it from.
     pub rare: bool,
+    /// Whether it is a filter: linear in the force, or the slip, that passes it, and adds nothing of its own.
+    pub filters: bool,
     /// Whether a measuring chain leaves what looks like it: kernels that differ, slip's noise that flattens the curve, the
     /// pitch of a ring.
     pub fed_by_chain: bool,
@@ -197,6 +199,7 @@ impl Facts {
             counter_form: false,
             scales_level: false,
             rare: false,
+            filters: false,
             fed_by_chain: false,
         }
     }

@@ -8,7 +8,11 @@ pub struct ForceDelay;
 
 impl Describe for ForceDelay {
     fn facts(&self) -> Facts {
-        Facts::of(Id::ForceDelay, Stage::Line, "reading(t) = drag(t - delay)")
+        let equation = "reading(t) = drag(t - delay)";
+        Facts {
+            filters: true,
+            ..Facts::of(Id::ForceDelay, Stage::Line, equation)
+        }
     }
     fn memory_s(&self, p: &[f64], _context: &Context) -> Option<f64> {
         p.first().copied()

@@ -9,11 +9,11 @@ pub struct ForceLag;
 
 impl Describe for ForceLag {
     fn facts(&self) -> Facts {
-        Facts::of(
-            Id::ForceLag,
-            Stage::Filter,
-            "time_constant * d(reading)/dt + reading = drag",
-        )
+        let equation = "time_constant * d(reading)/dt + reading = drag";
+        Facts {
+            filters: true,
+            ..Facts::of(Id::ForceLag, Stage::Filter, equation)
+        }
     }
     fn memory_s(&self, p: &[f64], _context: &Context) -> Option<f64> {
         p.first().copied()

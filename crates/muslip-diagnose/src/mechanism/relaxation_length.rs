@@ -37,6 +37,7 @@ impl Describe for RelaxationLength {
         };
         Facts {
             form,
+            filters: true,
             ..Facts::of(Id::RelaxationLength, stage, equation)
         }
     }

@@ -39,6 +39,7 @@ impl Describe for StructuralResonance {
         Facts {
             form,
             amplitude,
+            filters: true,
             ..Facts::of(Id::StructuralResonance, Stage::Structure, equation)
         }
     }
