@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use super::rows::quiet_force;
@@ -425,6 +426,35 @@ impl BalanceParts {
             all[usize::from(!source.of_slip)] += variance;
         }
         all
+    }
+
+    /// What stays what it is over a run makes of each of its blocks, by what is left there: the most likely under the
+    /// sizes as fitted, each block for itself.
+    #[must_use]
+    pub fn of_run(&self, run: usize, left: &[f64]) -> Vec<f64> {
+        let constants: Vec<&Source> = self.sources.iter().filter(|s| s.kind == OF_A_RUN).collect();
+        let gains = |block: usize| {
+            let gain = |s: &&Source| s.gain[run].get(block).copied().unwrap_or(1.0);
+            DVector::from_iterator(constants.len(), constants.iter().map(gain))
+        };
+        let precision = constants.iter().map(|s| (-2.0 * s.log_std).exp());
+        let precision = DVector::from_iterator(constants.len(), precision);
+        let mut products = DMatrix::from_diagonal(&precision);
+        let mut right = DVector::zeros(constants.len());
+        for (block, left) in left.iter().enumerate() {
+            let [of_slip, of_all_else] = self.variances(run, block);
+            let weight = 1.0 / (of_slip + of_all_else);
+            if weight.is_finite() && left.is_finite() {
+                let own = gains(block);
+                right.axpy(weight * left, &own, 1.0);
+                products.ger(weight, &own, &own, 1.0);
+            }
+        }
+        let made = products.cholesky().map(|products| products.solve(&right));
+        let made = made.unwrap_or_else(|| DVector::zeros(constants.len()));
+        (0..left.len())
+            .map(|block| gains(block).dot(&made))
+            .collect()
     }
 
     /// Parts with a memory on one run, in the order of the sources.

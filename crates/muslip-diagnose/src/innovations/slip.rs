@@ -18,6 +18,8 @@ use crate::series::Series;
 const REACH_S: f64 = 0.008;
 /// Farthest that the slip is moved, in its standard deviations.
 const FARTHEST_STDS: f64 = 3.0;
+/// The same as a share of the slip at the peak: farther the curve is no line, as near standstill, where the slip is all noise.
+const FARTHEST_SHARE: f64 = 0.25;
 
 /// The campaign with its slip reconciled with the drag under a base law and its noise; the drag's own readings, and
 /// what the wheel and the vehicle are weighed by, stay as they are.
@@ -29,8 +31,9 @@ pub fn reconciled(mut data: Data, base: &Judged) -> Data {
     };
     let slopes = Slopes::new(&data, &base.model);
     let radius = data.context.radius;
+    let farthest_slip = FARTHEST_SHARE * base.model.base[1].exp();
     for (run, s) in data.series.iter_mut().enumerate() {
-        let blocks = &data.blocks[run][Balance::Tyre as usize].samples;
+        let blocks = &data.blocks[run][Balance::Tyre as usize];
         let left: Vec<f64> = s
             .drag_smooth
             .iter()
@@ -39,8 +42,10 @@ pub fn reconciled(mut data: Data, base: &Judged) -> Data {
             .collect();
         // What is faster is the drag's own noise.
         let left = mean_twice_about(&s.time, &left, &s.tyre, REACH_S);
+        // What a run's drag is off by throughout is no error of its slip.
+        let of_run = parts.of_run(run, &blocks.mean(&left));
         let mut beside = vec![0.0; s.len()];
-        for (block, samples) in blocks.iter().enumerate() {
+        for (block, samples) in blocks.samples.iter().enumerate() {
             let [of_slip, of_force] = parts.variances(run, block);
             for k in samples.clone() {
                 let g = slopes.slip[run][k];
@@ -49,8 +54,8 @@ pub fn reconciled(mut data: Data, base: &Judged) -> Data {
                     continue;
                 }
                 let share = of_slip / (of_slip + of_force);
-                let farthest = FARTHEST_STDS * of_slip.sqrt();
-                let force = (share * left[k]).clamp(-farthest, farthest);
+                let farthest = f64::min(FARTHEST_STDS * of_slip.sqrt(), farthest_slip * g.abs());
+                let force = (share * (left[k] - of_run[block])).clamp(-farthest, farthest);
                 if force.is_finite() {
                     // Where the curve is flat the force says nothing of the slip.
                     let by = force / g;
@@ -161,6 +166,36 @@ mod tests {
         );
         assert!(before > 0.8, "{before}");
         assert!(after.abs() < 0.5 * before, "{after} of {before}");
+    }
+
+    #[test]
+    fn a_zero_of_a_run_moves_no_slip() {
+        let data = stop(Noise::TYPICAL, 4);
+        let mut base = judged(&data);
+        let sources = base.parts.iter_mut().flat_map(|p| &mut p.sources);
+        for source in sources.filter(|s| s.name == "zero of a run") {
+            source.log_std = f64::ln(300.0);
+        }
+        let mut shifted = data.clone();
+        let s = &mut shifted.series[0];
+        for drag in s.drag.iter_mut().chain(&mut s.drag_smooth) {
+            *drag += 300.0;
+        }
+        let wheel = |data: &Data| {
+            reconciled(data.clone(), &base).series[0]
+                .wheel
+                .smooth
+                .clone()
+        };
+        let (own, other) = (wheel(&data), wheel(&shifted));
+        let rms = |a: &[f64], b: &[f64]| {
+            let squares = a.iter().zip(b).map(|(a, b)| (a - b).powi(2));
+            (squares.sum::<f64>() / a.len() as f64).sqrt()
+        };
+        let moved = rms(&own, &data.series[0].wheel.smooth);
+        let changed = rms(&own, &other);
+        assert!(moved > 0.01, "{moved}");
+        assert!(changed < 0.1 * moved, "{changed} of {moved}");
     }
 
     #[test]
