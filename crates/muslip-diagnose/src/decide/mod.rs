@@ -8,7 +8,7 @@ use finalists::{Screen, effort};
 use rank::rank;
 pub use rank::softness;
 use trial::{Before, left_open, needed};
-pub use trial::{Claim, Trial, could_stand, stands};
+pub use trial::{Claim, Trial, could_stand, rivals, stands};
 
 use crate::chain::timing::Untold;
 use crate::constants::{
@@ -638,6 +638,26 @@ mod tests {
             },
         ];
         assert!(refused.iter().all(|trial| !stands(trial) && !needed(trial)));
+    }
+
+    #[test]
+    fn what_does_not_stand_for_its_size_alone_is_a_rival_of_what_stands() {
+        let data = stop(Noise::TYPICAL, 4);
+        let base = toy::settled(&data);
+        let radius = |nats: f64, t: f64| Trial {
+            at_sensors: (nats, 1.0),
+            predicts: 0.2,
+            ..of_name(&data, &base, Id::EffectiveRadius, nats, t)
+        };
+        let small = |trial: Trial| Trial { size: 0.0, ..trial };
+        assert!(stands(&radius(9.0, 3.0)) && rivals(&radius(9.0, 3.0)));
+        assert!(!stands(&small(radius(9.0, 3.0))) && rivals(&small(radius(9.0, 3.0))));
+        assert!(!rivals(&radius(9.0, 0.5)) && !rivals(&radius(-0.1, 3.0)));
+        let refuted = Trial {
+            own: false,
+            ..radius(9.0, 3.0)
+        };
+        assert!(!rivals(&refuted));
     }
 
     #[test]

@@ -388,9 +388,13 @@ fn worth(trial: &Trial) -> f64 {
 /// Whether a trial could be named, were it seen: large enough, itself, neither a memory of the chain's nor what one leaves,
 /// and better at predicting.
 fn could_be_named(trial: &Trial) -> bool {
-    let large = trial.size > worth(trial);
+    trial.size > worth(trial) && is_plausible(trial)
+}
+
+/// Whether nothing says that a trial is something else than its claim.
+fn is_plausible(trial: &Trial) -> bool {
     let not_of_chain = trial.outlasts_chain && trial.beside_chain;
-    large && trial.own && not_of_chain && trial.predicts > LEAST_PREDICTED
+    trial.own && not_of_chain && trial.predicts > LEAST_PREDICTED
 }
 
 /// Gain from which a name that unseen runs bear out is seen, nats.
@@ -435,10 +439,23 @@ pub fn could_stand(trial: &Trial) -> bool {
     gains_on_unseen_runs(trial) && could_be_named(trial)
 }
 
-/// Whether unseen runs gain, alike or not.
+/// Whether a trial takes of the likelihood of one that stands: it stands itself, or does not for its size alone, which may
+/// be little beside nothing but is much beside what is hardly larger.
+#[must_use]
+pub fn rivals(trial: &Trial) -> bool {
+    let small = trial.mechanism().is_some() && is_plausible(trial);
+    stands(trial) || small && trial.gain > 0.0 && unseen_runs_gain(trial)
+}
+
+/// Whether unseen runs gain, alike or not, and enough.
 fn gains_on_unseen_runs(trial: &Trial) -> bool {
+    trial.gain > least_gain_of_name(trial) && unseen_runs_gain(trial)
+}
+
+/// Whether unseen runs gain, alike or not.
+fn unseen_runs_gain(trial: &Trial) -> bool {
     let (mean, t) = trial.unseen;
-    trial.gain > least_gain_of_name(trial) && mean > 0.0 && t > LEAST_T_OF_LIKELIER
+    mean > 0.0 && t > LEAST_T_OF_LIKELIER
 }
 
 /// Whether a name is of use beside others that were named: whatever it is worth alone was settled when it was taken up.

@@ -8,7 +8,7 @@ use crate::constants::{
     AUDITED, FEW_RUNS_SURE, FORM_OF_DELAY_S, HARDLY_LESS, LEAST_CONFIDENCE, LEAST_DELAY_S,
     PREDICTED_APART, RARE_SHARE, SURE_DELAY, TIED, VAGUE_DELAY_S,
 };
-use crate::decide::{Claim, Trial, softness, stands};
+use crate::decide::{Claim, Trial, rivals, softness};
 use crate::figures::{figures, with_form};
 use crate::innovations::dependence::Dependence;
 use crate::mechanism::{Balance, Id, Reported, Speed};
@@ -261,7 +261,7 @@ fn shares(trial: &Trial, round: &[Trial]) -> (f64, Vec<Alternative>) {
     let mut outside = 0.0f64;
     for other in round
         .iter()
-        .filter(|t| stands(t) || t.mechanism().map(|m| m.0) == own)
+        .filter(|t| rivals(t) || t.mechanism().map(|m| m.0) == own)
     {
         match other.mechanism() {
             Some((id, _)) => {
