@@ -251,11 +251,12 @@ pub fn is_filtered(catalogue: &Catalogue, model: &Model) -> bool {
     terms.any(|term| catalogue.get(term.entry).facts().filters)
 }
 
-/// What a model's filters leave of a change of the force in N, as long as the series, where the reading is taken. A change
-/// of the slip passes them as the change of the force that it makes.
+/// What a model's filters leave of a change of the force in N, as long as the series, where the reading is taken: those
+/// from a stage on. A change of the slip passes them, from its own stage on, as the change of the force that it makes.
 pub fn filtered(
     catalogue: &Catalogue,
     model: &Model,
+    from: Stage,
     series: &Series,
     context: &Context,
     mut change: Vec<f64>,
@@ -267,7 +268,7 @@ pub fn filtered(
             facts.filters && facts.stage == stage
         })
     };
-    for stage in FILTERED_AT {
+    for stage in FILTERED_AT.into_iter().skip_while(|stage| *stage != from) {
         for term in filters(stage) {
             let of_slip = stage == Stage::Slip;
             let passing = |state: &mut State<f64>| {
@@ -392,6 +393,7 @@ pub fn vehicle<T: Listed>(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::data::Data;
     use crate::innovations::toy::{Noise, stop};
 
     #[test]
@@ -416,7 +418,12 @@ mod tests {
                 entry,
                 parameters: parameters.iter().map(|p| f64::max(p.low, 0.02)).collect(),
             });
-            let passed = |x: Vec<f64>| filtered(&data.catalogue, &model, series, &data.context, x);
+            let passed = |x: Vec<f64>| {
+                let Data {
+                    catalogue, context, ..
+                } = &data;
+                filtered(catalogue, &model, Stage::Slip, series, context, x)
+            };
             let both = core::iter::zip(&slow, &fast).map(|(s, f)| 3.0 * s - 2.0 * f);
             let both = passed(both.collect());
             let alone = [&slow, &fast].map(|wave| passed(wave.clone()));

@@ -7,8 +7,8 @@ mod trial;
 use finalists::{Screen, effort};
 use rank::rank;
 pub use rank::softness;
-use trial::{Before, left_open, needed};
-pub use trial::{Claim, Trial, could_stand, rivals, stands};
+use trial::{Before, left_open, needed, stands};
+pub use trial::{Claim, Trial, could_stand, rivals};
 
 use crate::chain::timing::Untold;
 use crate::constants::{
@@ -652,7 +652,15 @@ mod tests {
         let small = |trial: Trial| Trial { size: 0.0, ..trial };
         assert!(stands(&radius(9.0, 3.0)) && rivals(&radius(9.0, 3.0)));
         assert!(!stands(&small(radius(9.0, 3.0))) && rivals(&small(radius(9.0, 3.0))));
-        assert!(!rivals(&radius(9.0, 0.5)) && !rivals(&radius(-0.1, 3.0)));
+        // As large as may be, but not seen.
+        assert!(!rivals(&radius(9.0, 1.2)) && !rivals(&radius(3.0, 2.9)));
+        // Small, and hidden by the runs' own differences.
+        let hidden = Trial {
+            first: true,
+            at_sensors: (60.0, 9.0),
+            ..radius(1.0, 0.0)
+        };
+        assert!(!stands(&small(hidden.clone())) && rivals(&small(hidden)));
         let refuted = Trial {
             own: false,
             ..radius(9.0, 3.0)

@@ -409,13 +409,17 @@ fn least_gain_of_name(trial: &Trial) -> f64 {
 /// Whether a trial stands.
 #[must_use]
 pub fn stands(trial: &Trial) -> bool {
+    is_seen(trial) && could_be_named(trial)
+}
+
+/// Whether a trial is seen, by the noise as fitted or by the sensors'.
+fn is_seen(trial: &Trial) -> bool {
     let least_gain = if trial.mechanism().is_some() {
         least_gain_of_name(trial)
     } else {
         DEPENDENCE_WORTH * worth(trial)
     };
-    let seen = trial.gain > least_gain && seen_on_unseen_runs(trial);
-    (seen || hidden(trial)) && could_be_named(trial)
+    trial.gain > least_gain && seen_on_unseen_runs(trial) || hidden(trial)
 }
 
 /// Whether the runs' own differences hide what all runs show at the sensors' noise: then the fitted noise, which may be
@@ -444,18 +448,13 @@ pub fn could_stand(trial: &Trial) -> bool {
 #[must_use]
 pub fn rivals(trial: &Trial) -> bool {
     let small = trial.mechanism().is_some() && is_plausible(trial);
-    stands(trial) || small && trial.gain > 0.0 && unseen_runs_gain(trial)
-}
-
-/// Whether unseen runs gain, alike or not, and enough.
-fn gains_on_unseen_runs(trial: &Trial) -> bool {
-    trial.gain > least_gain_of_name(trial) && unseen_runs_gain(trial)
+    stands(trial) || small && is_seen(trial)
 }
 
 /// Whether unseen runs gain, alike or not.
-fn unseen_runs_gain(trial: &Trial) -> bool {
+fn gains_on_unseen_runs(trial: &Trial) -> bool {
     let (mean, t) = trial.unseen;
-    mean > 0.0 && t > LEAST_T_OF_LIKELIER
+    trial.gain > least_gain_of_name(trial) && mean > 0.0 && t > LEAST_T_OF_LIKELIER
 }
 
 /// Whether a name is of use beside others that were named: whatever it is worth alone was settled when it was taken up.

@@ -57,6 +57,23 @@ impl Blocks {
         out
     }
 
+    /// By how many s neighbours are apart in the mean; infinite where none has one.
+    #[must_use]
+    pub fn apart_s(&self) -> f64 {
+        let (mut steps, mut span) = (0.0, 0.0);
+        for own in self.segments.iter().map(|s| &self.time[s.clone()]) {
+            if let [first, .., last] = own {
+                steps += (own.len() - 1) as f64;
+                span += last - first;
+            }
+        }
+        if steps > 0.0 {
+            span / steps
+        } else {
+            f64::INFINITY
+        }
+    }
+
     /// Means of a column; nothing of an empty one.
     #[must_use]
     pub fn mean(&self, column: &[f64]) -> Vec<f64> {

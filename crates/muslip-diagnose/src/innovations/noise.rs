@@ -200,6 +200,12 @@ impl Source {
         }
     }
 
+    /// Variance of a block of one run as fitted.
+    fn variance(&self, run: usize, block: usize) -> f64 {
+        let gain = self.gain[run].get(block).copied().unwrap_or(1.0);
+        (2.0 * self.log_std).exp() * gain * gain
+    }
+
     /// The same as an error of the slip.
     fn of_slip(self) -> Self {
         Self {
@@ -310,7 +316,9 @@ impl<'a> Sensors<'a> {
             Source::new("friction of a run", OF_A_RUN, force, 0.002).at_most(0.005),
             Source::new("zero of a run", OF_A_RUN, none, 0.1 * self.drag)
                 .at_most(0.002 * self.data.context.max_drag),
-            Source::new("slip of a run", OF_A_RUN, &gain(&self.slopes.slip), 1e-4).at_most(5e-4),
+            Source::new("slip of a run", OF_A_RUN, &gain(&self.slopes.slip), 1e-4)
+                .at_most(5e-4)
+                .of_slip(),
         ]
     }
 
@@ -416,22 +424,22 @@ impl BalanceParts {
     #[must_use]
     pub fn variances(&self, run: usize, block: usize) -> [f64; 2] {
         let mut all = [0.0; 2];
-        for source in &self.sources {
-            // What belongs to a run is no noise that a model could follow.
-            if source.kind == Some(Kind::Constant) {
-                continue;
-            }
-            let gain = source.gain[run].get(block).copied().unwrap_or(1.0);
-            let variance = (2.0 * source.log_std).exp() * gain * gain;
-            all[usize::from(!source.of_slip)] += variance;
+        for source in self.varying() {
+            all[usize::from(!source.of_slip)] += source.variance(run, block);
         }
         all
     }
 
-    /// What stays what it is over a run makes of each of its blocks, by what is left there: the most likely under the
-    /// sizes as fitted, each block for itself.
+    /// All but what belongs to a run, which is no noise that a model could follow.
+    fn varying(&self) -> impl Iterator<Item = &Source> {
+        self.sources.iter().filter(|s| s.kind != OF_A_RUN)
+    }
+
+    /// What a run's own friction and zero come to in each of its blocks, fitted to what is left there beside its own slip
+    /// under the sizes as fitted. Blocks so many s apart tell a constant as little of a part with a memory as one in twice
+    /// that memory does.
     #[must_use]
-    pub fn of_run(&self, run: usize, left: &[f64]) -> Vec<f64> {
+    pub fn of_run(&self, run: usize, apart_s: f64, left: &[f64]) -> Vec<f64> {
         let constants: Vec<&Source> = self.sources.iter().filter(|s| s.kind == OF_A_RUN).collect();
         let gains = |block: usize| {
             let gain = |s: &&Source| s.gain[run].get(block).copied().unwrap_or(1.0);
@@ -442,8 +450,14 @@ impl BalanceParts {
         let mut products = DMatrix::from_diagonal(&precision);
         let mut right = DVector::zeros(constants.len());
         for (block, left) in left.iter().enumerate() {
-            let [of_slip, of_all_else] = self.variances(run, block);
-            let weight = 1.0 / (of_slip + of_all_else);
+            let told = |source: &Source| {
+                let memory_s = match source.kind {
+                    Some(Kind::Forgetting(time_s)) => time_s,
+                    _ => 0.0,
+                };
+                source.variance(run, block) * f64::max(1.0, 2.0 * memory_s / apart_s)
+            };
+            let weight = 1.0 / self.varying().map(told).sum::<f64>();
             if weight.is_finite() && left.is_finite() {
                 let own = gains(block);
                 right.axpy(weight * left, &own, 1.0);
@@ -451,7 +465,12 @@ impl BalanceParts {
             }
         }
         let made = products.cholesky().map(|products| products.solve(&right));
-        let made = made.unwrap_or_else(|| DVector::zeros(constants.len()));
+        let mut made = made.unwrap_or_else(|| DVector::zeros(constants.len()));
+        for (made, source) in made.iter_mut().zip(&constants) {
+            if source.of_slip {
+                *made = 0.0;
+            }
+        }
         (0..left.len())
             .map(|block| gains(block).dot(&made))
             .collect()

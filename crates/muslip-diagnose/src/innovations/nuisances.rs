@@ -3,7 +3,7 @@
 use super::noise::Slopes;
 use super::rows::{Triple, quiet_force};
 use crate::data::Data;
-use crate::mechanism::Balance;
+use crate::mechanism::{Balance, Stage};
 use crate::model::{Model, filtered, is_filtered};
 use crate::number::finite_or_zero;
 use crate::prepare::mean_twice_about;
@@ -81,6 +81,8 @@ struct Chain<'a> {
     series: &'a Series,
     slopes: &'a Slopes,
     run: usize,
+    /// Whether the model's force passes a filter.
+    is_filtered: bool,
     /// Rates of the speeds, nothing where there are none.
     wheel_rate: Vec<f64>,
     speed_rate: Vec<f64>,
@@ -99,6 +101,7 @@ impl<'a> Chain<'a> {
             series,
             slopes,
             run,
+            is_filtered: is_filtered(&data.catalogue, model),
             wheel_rate: finite(&series.wheel.rate),
             speed_rate: finite(&series.speed.rate),
         }
@@ -107,13 +110,18 @@ impl<'a> Chain<'a> {
     /// Means over the blocks of what stands in each balance, sample by sample, where the balance is formed; nothing
     /// where it stands in none. What stands in the tyre's is a change of the force in the contact.
     fn columns(&self, entries: [Option<Entry<'_>>; 3]) -> Triple {
+        self.columns_from(Stage::Contact, entries)
+    }
+
+    /// The same, what stands in the tyre's balance being a change of the force that comes about at this stage.
+    fn columns_from(&self, stage: Stage, entries: [Option<Entry<'_>>; 3]) -> Triple {
         let blocks = &self.data.blocks[self.run];
         let balances = [Balance::Tyre, Balance::Wheel, Balance::Vehicle];
         core::array::from_fn(|b| match entries[b] {
             Some(entry) if !self.series.segments(balances[b]).is_empty() => {
                 let entry = |k: usize| finite_or_zero(entry(k));
-                if balances[b] == Balance::Tyre && is_filtered(&self.data.catalogue, self.model) {
-                    let read = self.filtered((0..self.series.len()).map(entry).collect());
+                if balances[b] == Balance::Tyre && self.is_filtered {
+                    let read = self.filtered(stage, entry);
                     blocks[b].mean_of(|k| read[k])
                 } else {
                     blocks[b].mean_of(entry)
@@ -123,27 +131,34 @@ impl<'a> Chain<'a> {
         })
     }
 
-    /// What the model's filters leave of a change of the force in the contact: an error of the slip comes as late to the
-    /// reading as the force that it makes.
-    fn filtered(&self, change: Vec<f64>) -> Vec<f64> {
+    /// What the model's filters from a stage on leave of a change of the force: an error of the slip comes as late to the
+    /// reading as the force that it makes. Where no tyre's balance is formed nothing is known of such an error.
+    fn filtered(&self, from: Stage, change: impl Fn(usize) -> f64) -> Vec<f64> {
+        let s = self.series;
+        let mut known = vec![0.0; s.len()];
+        for k in s.tyre.iter().flat_map(Clone::clone) {
+            known[k] = change(k);
+        }
         let Data {
             catalogue, context, ..
         } = self.data;
-        filtered(catalogue, self.model, self.series, context, change)
+        filtered(catalogue, self.model, from, s, context, known)
     }
 
     /// Where the wheel speed reads so much less.
     fn by_wheel(&self, u: impl Fn(usize) -> f64) -> Triple {
         let slope = &self.slopes.wheel[self.run];
         let inertia = self.data.context.inertia;
-        self.columns([Some(&|k| -slope[k] * u(k)), Some(&|k| inertia * u(k)), None])
+        let (force, level) = (|k: usize| -slope[k] * u(k), |k: usize| inertia * u(k));
+        self.columns_from(Stage::Slip, [Some(&force), Some(&level), None])
     }
 
     /// Where the vehicle speed reads so much less.
     fn by_speed(&self, u: impl Fn(usize) -> f64) -> Triple {
         let slope = &self.slopes.speed[self.run];
         let mass = self.data.context.mass;
-        self.columns([Some(&|k| -slope[k] * u(k)), None, Some(&|k| mass * u(k))])
+        let (force, level) = (|k: usize| -slope[k] * u(k), |k: usize| mass * u(k));
+        self.columns_from(Stage::Slip, [Some(&force), None, Some(&level)])
     }
 
     /// Zero-phase: what inputs and reading differ by in bandwidth, and what smoothing leaves of the slip's noise.
@@ -348,8 +363,14 @@ mod tests {
     fn a_change_of_the_force_comes_to_the_reading_as_a_filtered_model_has_it() {
         let plain = stop(Noise::FINE_WHEEL, 2);
         let base = settled(&plain);
-        for (id, time_s) in [(Id::ForceDelay, 0.02), (Id::ForceLag, 0.02)] {
-            let model = with_term(&plain, &base, id, time_s);
+        // A relaxation of the slip is none of a force that the reading brings about.
+        let memories = [
+            (Id::ForceDelay, 0.02),
+            (Id::ForceLag, 0.02),
+            (Id::RelaxationLength, 0.3),
+        ];
+        for (id, parameter) in memories {
+            let model = with_term(&plain, &base, id, parameter);
             let change = |k: usize| 100.0 * (20.0 * plain.series[0].time[k]).sin();
             // The other way: rows of the model whose force is less by the change.
             let mut less = plain.clone();

@@ -5,7 +5,8 @@
 //! that starts too flat, friction that falls at low sliding speed. So the curve is taken at the slip that speeds and
 //! drag agree on, s = s₀ + K (F − N mu(s₀)) with K = g σs² / (g² σs² + σF²), and the row is F − N mu(s) − g (s₀ − s): to
 //! first order the same, but with the noise of the speeds where it belongs, beside the curve (orthogonal regression;
-//! W. A. Fuller, Measurement Error Models, Wiley 1987, section 3.2).
+//! W. A. Fuller, Measurement Error Models, Wiley 1987, section 3.2). What a run's drag is off by throughout is taken off F
+//! first, and no slip moves farther than the curve is a line.
 
 use super::hypothesis::Judged;
 use super::noise::{BalanceParts, Slopes};
@@ -43,7 +44,7 @@ pub fn reconciled(mut data: Data, base: &Judged) -> Data {
         // What is faster is the drag's own noise.
         let left = mean_twice_about(&s.time, &left, &s.tyre, REACH_S);
         // What a run's drag is off by throughout is no error of its slip.
-        let of_run = parts.of_run(run, &blocks.mean(&left));
+        let of_run = parts.of_run(run, blocks.apart_s(), &blocks.mean(&left));
         let mut beside = vec![0.0; s.len()];
         for (block, samples) in blocks.samples.iter().enumerate() {
             let [of_slip, of_force] = parts.variances(run, block);
@@ -196,6 +197,33 @@ mod tests {
         let changed = rms(&own, &other);
         assert!(moved > 0.01, "{moved}");
         assert!(changed < 0.1 * moved, "{changed} of {moved}");
+    }
+
+    #[test]
+    fn no_slip_moves_farther_than_the_curve_is_a_line() {
+        let data = stop(Noise::TYPICAL, 5);
+        let mut base = judged(&data);
+        let sources = base.parts.iter_mut().flat_map(|p| &mut p.sources);
+        for source in sources.filter(|s| s.of_slip) {
+            source.log_std += f64::ln(100.0);
+        }
+        // Far off, and by what no zero of a run is.
+        let mut off = data.clone();
+        let s = &mut off.series[0];
+        for k in 0..s.drag_smooth.len() {
+            s.drag_smooth[k] += 2000.0 * (2.0 * s.time[k]).sin();
+        }
+        let radius = data.context.radius;
+        let moved = reconciled(off, &base);
+        let (before, after) = (&data.series[0], &moved.series[0]);
+        let by = (0..before.len()).filter(|k| before.rolling[*k]).map(|k| {
+            let turned = after.wheel.smooth[k] - before.wheel.smooth[k];
+            (radius * turned / before.speed.smooth[k]).abs()
+        });
+        let farthest = by.fold(0.0, f64::max);
+        let most = FARTHEST_SHARE * base.model.base[1].exp();
+        assert!(farthest > 0.9 * most, "{farthest} of {most}");
+        assert!(farthest < 1.000_1 * most, "{farthest} of {most}");
     }
 
     #[test]
