@@ -200,9 +200,14 @@ impl Source {
         }
     }
 
+    /// By what it enters a block of one run.
+    fn gain_in(&self, run: usize, block: usize) -> f64 {
+        self.gain[run].get(block).copied().unwrap_or(1.0)
+    }
+
     /// Variance of a block of one run as fitted.
     fn variance(&self, run: usize, block: usize) -> f64 {
-        let gain = self.gain[run].get(block).copied().unwrap_or(1.0);
+        let gain = self.gain_in(run, block);
         (2.0 * self.log_std).exp() * gain * gain
     }
 
@@ -436,14 +441,14 @@ impl BalanceParts {
     }
 
     /// What a run's own friction and zero come to in each of its blocks, fitted to what is left there beside its own slip
-    /// under the sizes as fitted. Blocks so many s apart tell a constant as little of a part with a memory as one in twice
-    /// that memory does.
+    /// under the sizes as fitted. Blocks are so many s apart: under noise with a memory they tell no more of a constant than
+    /// one block in twice that memory.
     #[must_use]
     pub fn of_run(&self, run: usize, apart_s: f64, left: &[f64]) -> Vec<f64> {
         let constants: Vec<&Source> = self.sources.iter().filter(|s| s.kind == OF_A_RUN).collect();
         let gains = |block: usize| {
-            let gain = |s: &&Source| s.gain[run].get(block).copied().unwrap_or(1.0);
-            DVector::from_iterator(constants.len(), constants.iter().map(gain))
+            let all = constants.iter().map(|s| s.gain_in(run, block));
+            DVector::from_iterator(constants.len(), all)
         };
         let precision = constants.iter().map(|s| (-2.0 * s.log_std).exp());
         let precision = DVector::from_iterator(constants.len(), precision);
