@@ -262,33 +262,28 @@ pub fn filtered(
     mut change: Vec<f64>,
 ) -> Vec<f64> {
     let mut state = State::empty();
-    let filters = |stage: Stage| {
-        model.terms.iter().filter(move |term| {
-            let facts = catalogue.get(term.entry).facts();
-            facts.filters && facts.stage == stage
-        })
-    };
     for stage in FILTERED_AT.into_iter().skip_while(|stage| *stage != from) {
-        for term in filters(stage) {
-            let of_slip = stage == Stage::Slip;
-            let passing = |state: &mut State<f64>| {
-                core::mem::take(if of_slip {
-                    &mut state.slip
-                } else {
-                    &mut state.force
-                })
-            };
-            if of_slip {
-                state.slip = change;
-            } else {
-                state.force = change;
+        for term in &model.terms {
+            let facts = catalogue.get(term.entry).facts();
+            if !facts.filters || facts.stage != stage {
+                continue;
             }
+            *passing(&mut state, stage) = change;
             let mechanism = f64::entry(catalogue, term.entry);
             mechanism.apply(&term.parameters, series, context, &mut state);
-            change = passing(&mut state);
+            change = core::mem::take(passing(&mut state, stage));
         }
     }
     change
+}
+
+/// What passes a filter that stands at a stage.
+fn passing(state: &mut State<f64>, stage: Stage) -> &mut Vec<f64> {
+    if stage == Stage::Slip {
+        &mut state.slip
+    } else {
+        &mut state.force
+    }
 }
 
 /// What the terms make of a wheel or a vehicle on which nothing acts but the brake torque as smoothed.

@@ -124,6 +124,12 @@ mod tests {
         base
     }
 
+    /// Root of the mean square of what is finite.
+    fn rms(x: impl Iterator<Item = f64>) -> f64 {
+        let all: Vec<f64> = x.filter(|x| x.is_finite()).collect();
+        (all.iter().map(|x| x * x).sum::<f64>() / all.len() as f64).sqrt()
+    }
+
     /// Share of the tyre's residual on free rolling, in blocks, that a factor on the law's force would take away.
     fn bought(data: &Data, model: &Model) -> f64 {
         let blocks = &data.blocks[0][0];
@@ -147,12 +153,8 @@ mod tests {
             rows_of(&data, &base.model, 0).tyre,
             rows_of(&other, &base.model, 0).tyre,
         );
-        let rms = |x: &mut dyn Iterator<Item = f64>| {
-            let all: Vec<f64> = x.filter(|x| x.is_finite()).collect();
-            (all.iter().map(|x| x * x).sum::<f64>() / all.len() as f64).sqrt()
-        };
-        let moved = rms(&mut other.series[0].beside_law.iter().copied());
-        let changed = rms(&mut a.iter().zip(&b).map(|(a, b)| a - b));
+        let moved = rms(other.series[0].beside_law.iter().copied());
+        let changed = rms(a.iter().zip(&b).map(|(a, b)| a - b));
         assert!(moved > 20.0, "{moved}");
         assert!(changed < 0.1 * moved, "{changed} of {moved}");
     }
@@ -189,12 +191,9 @@ mod tests {
                 .clone()
         };
         let (own, other) = (wheel(&data), wheel(&shifted));
-        let rms = |a: &[f64], b: &[f64]| {
-            let squares = a.iter().zip(b).map(|(a, b)| (a - b).powi(2));
-            (squares.sum::<f64>() / a.len() as f64).sqrt()
-        };
-        let moved = rms(&own, &data.series[0].wheel.smooth);
-        let changed = rms(&own, &other);
+        let apart = |a: &[f64], b: &[f64]| rms(a.iter().zip(b).map(|(a, b)| a - b));
+        let moved = apart(&own, &data.series[0].wheel.smooth);
+        let changed = apart(&own, &other);
         assert!(moved > 0.01, "{moved}");
         assert!(changed < 0.1 * moved, "{changed} of {moved}");
     }
