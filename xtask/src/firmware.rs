@@ -9,7 +9,7 @@ use anyhow::{Context, Result, bail, ensure};
 
 use crate::figures::{figures, replaced_between};
 use crate::image::{Forbidden, Image};
-use crate::step::{cargo, command, root, run, step};
+use crate::step::{CHECKED, cargo, command, program, root, run, step, target};
 use crate::{latency, setup};
 
 /// Target of the image.
@@ -38,27 +38,22 @@ const TABLE: [&str; 2] = [
 /// Where the rig page's table of interrupts is.
 const LATENCIES: [&str; 2] = ["<!-- latencies -->", "<!-- end of latencies -->"];
 
-fn target_folder() -> PathBuf {
-    std::env::var_os("CARGO_TARGET_DIR")
-        .map_or_else(|| root().join("target"), |folder| root().join(folder))
-}
-
 fn image_path(name: &str) -> PathBuf {
-    target_folder().join(TARGET).join(PROFILE).join(name)
+    target().join(TARGET).join(PROFILE).join(name)
 }
 
 /// Builds the image of every board, and those that the checks must refuse.
 pub fn build() -> Result<()> {
     let arguments = ["build", "--locked", "--quiet", "--package", "firmware"];
-    let target = ["--profile", PROFILE, "--target", TARGET];
-    let image = [&arguments[..], &target, &["--bin", IMAGE]].concat();
+    let profile = ["--profile", PROFILE, "--target", TARGET];
+    let image = [&arguments[..], &profile, &["--bin", IMAGE]].concat();
     run("firmware", cargo(&image))?;
     for (board, name) in OTHER_BOARDS {
         let chosen = ["--no-default-features", "--features", board, "--bin", name];
-        let image = [&arguments[..], &target, &chosen].concat();
+        let image = [&arguments[..], &profile, &chosen].concat();
         run(&format!("firmware for {board}"), cargo(&image))?;
     }
-    let mut bad = [&arguments[..], &target, &["--features", "test-image"]].concat();
+    let mut bad = [&arguments[..], &profile, &["--features", "test-image"]].concat();
     for (_, name) in BAD_IMAGES {
         bad.extend(["--bin", name]);
     }
@@ -115,9 +110,9 @@ fn budgets_file() -> Result<BTreeMap<String, u64>> {
     figures(&fs::read_to_string(root().join(".ci/budgets.toml"))?)
 }
 
-/// The processor in the loop, with its images.
-fn loop_command() -> Command {
-    let mut pil = cargo(&[
+/// The processor in the loop, built for it as for users.
+fn built_loop() -> Command {
+    cargo(&[
         "run",
         "--release",
         "--locked",
@@ -125,18 +120,30 @@ fn loop_command() -> Command {
         "--package",
         "pil",
         "--",
-    ]);
-    pil.args([image_path(IMAGE), image_path("panic-image")]);
-    pil
+    ])
+}
+
+/// The processor in the loop as the tests have built it.
+fn loop_under_test() -> Command {
+    command(&program(CHECKED, "pil"), &[])
+}
+
+/// The two images that the processor in the loop is given.
+fn images() -> [PathBuf; 2] {
+    [image_path(IMAGE), image_path("panic-image")]
 }
 
 /// Builds, checks and runs the image in QEMU; `write` puts the figures into README and rig page.
 pub fn pil(arguments: &[String], write: bool) -> Result<()> {
     setup::run_all()?;
+    play(built_loop(), arguments, write)
+}
+
+fn play(mut pil: Command, arguments: &[String], write: bool) -> Result<()> {
     budgets()?;
-    let path = target_folder().join("pil.figures");
-    let mut pil = loop_command();
-    pil.arg("--figures")
+    let path = target().join("pil.figures");
+    pil.args(images())
+        .arg("--figures")
         .arg(&path)
         .args(arguments)
         .env("RUST_BACKTRACE", "0");
@@ -164,14 +171,15 @@ pub fn pil(arguments: &[String], write: bool) -> Result<()> {
 pub fn serve(address: &str) -> Result<()> {
     setup::run_all()?;
     budgets()?;
-    let mut pil = loop_command();
-    pil.args(["--serve", address]);
+    let mut pil = built_loop();
+    pil.args(images()).args(["--serve", address]);
     run("simulated rig", pil)
 }
 
 /// What `cargo xtask test` runs of it.
 pub fn test() -> Result<()> {
-    pil(&["--seconds".to_owned(), SECONDS_IN_TEST.to_owned()], false)
+    let arguments = ["--seconds".to_owned(), SECONDS_IN_TEST.to_owned()];
+    play(loop_under_test(), &arguments, false)
 }
 
 fn check_runs(

@@ -7,8 +7,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result, bail};
 
 use crate::setup;
-use crate::step::{CHECKED, cargo, command, root, run, target};
-use crate::trial::program;
+use crate::step::{CHECKED, cargo, command, program, root, run, target};
 
 /// The environment variable that names the command to the tests.
 const COMMAND: &str = "MUSLIP_COMMAND";
@@ -50,7 +49,7 @@ pub fn beside() -> Result<(String, &'static str)> {
         .args(["--features", "muslip-python/beside-command"]);
     run("the command that the package is held against", build)?;
     let features = "extension-module,beside-command";
-    Ok((program(&target(), CHECKED, "muslip"), features))
+    Ok((program(CHECKED, "muslip"), features))
 }
 
 /// Builds the wheel, installs it into virtual environments of its own and runs the package's tests there, against this

@@ -1,6 +1,7 @@
 //! One child process with its name and time, and where the workspace is.
 
-use std::path::PathBuf;
+use std::env::consts::EXE_SUFFIX;
+use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::time::Instant;
 
@@ -18,6 +19,20 @@ pub fn root() -> PathBuf {
 pub fn target() -> PathBuf {
     std::env::var_os("CARGO_TARGET_DIR")
         .map_or_else(|| root().join("target"), |folder| root().join(folder))
+}
+
+/// A program that was built in a profile.
+pub fn program(profile: &str, name: &str) -> String {
+    program_in(&target(), profile, name)
+}
+
+/// As [`program`], in another target folder.
+pub fn program_in(target: &Path, profile: &str, name: &str) -> String {
+    target
+        .join(profile)
+        .join(format!("{name}{EXE_SUFFIX}"))
+        .display()
+        .to_string()
 }
 
 /// `cargo` with these arguments, in the root, without standard input.

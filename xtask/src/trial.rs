@@ -5,7 +5,7 @@ use std::process::Command;
 
 use anyhow::{Context, Result, bail};
 
-use crate::step::{CHECKED, cargo, command, run, target};
+use crate::step::{CHECKED, cargo, command, program, program_in, run, target};
 
 /// The engine that later ones are held against, by its commit.
 const RIVAL: &str = "6b77987";
@@ -56,7 +56,7 @@ pub fn play(arguments: &[String]) -> Result<()> {
             "sealed-trial",
         ]),
     )?;
-    play_built(RELEASE, &program(&target(), RELEASE, "muslip"), &further)
+    play_built(RELEASE, &program(RELEASE, "muslip"), &further)
 }
 
 /// The small trial: continuous integration's seed, figures held by a ratchet. Of what the tests have built: their
@@ -68,26 +68,17 @@ pub fn small() -> Result<()> {
 
 /// The command as the tests have built it.
 pub fn under_test() -> String {
-    program(&target(), CHECKED, "muslip-under-test")
+    program(CHECKED, "muslip-under-test")
 }
 
 /// Plays the trial with programs that are built.
 fn play_built(profile: &str, muslip: &str, arguments: &[String]) -> Result<()> {
     let mut trial = command(
-        &program(&target(), profile, "sealed-trial"),
+        &program(profile, "sealed-trial"),
         &["run", "--muslip", muslip],
     );
     trial.args(arguments);
     run("sealed trial", trial)
-}
-
-/// A program in the target folder, built in a profile.
-pub fn program(target: &std::path::Path, profile: &str, name: &str) -> String {
-    target
-        .join(profile)
-        .join(format!("{name}{}", std::env::consts::EXE_SUFFIX))
-        .display()
-        .to_string()
 }
 
 /// What a git command prints.
@@ -118,7 +109,7 @@ fn clean_commit() -> Result<String> {
 fn rival() -> Result<PathBuf> {
     let folder = target().join("trial").join(format!("engine-{RIVAL}"));
     let built = folder.join("target");
-    let path = PathBuf::from(program(&built, RELEASE, "muslip"));
+    let path = PathBuf::from(program_in(&built, RELEASE, "muslip"));
     if path.exists() {
         return Ok(path);
     }
