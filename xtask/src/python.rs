@@ -13,7 +13,10 @@ use crate::step::{CHECKED, cargo, command, program, root, run, target};
 const COMMAND: &str = "MUSLIP_COMMAND";
 
 /// The features of a wheel that is released.
-pub const FEATURES: &str = "extension-module";
+const FEATURES: &str = "extension-module";
+
+/// The features of a wheel that is built beside the tests of the workspace, of what these are built of.
+pub const BESIDE_TESTS: &str = "extension-module,beside-tests";
 
 /// How much of the proof is part of the tests.
 const SMALL: Proof = Proof {
@@ -276,5 +279,54 @@ pub fn the_wheel(folder: &Path) -> Result<PathBuf> {
     match wheels.as_slice() {
         [one] => Ok(one.clone()),
         other => bail!("{} wheels in {}, not one", other.len(), folder.display()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::{BTreeMap, BTreeSet};
+
+    use super::BESIDE_TESTS;
+    use crate::step::{cargo, output};
+    use crate::test::TESTED_FEATURES;
+
+    /// The features of each package that is built, by its name and version.
+    fn built(arguments: &[&str]) -> BTreeMap<String, BTreeSet<String>> {
+        let mut tree = cargo(&["tree", "--offline", "--locked", "--no-dedupe"]);
+        tree.args(["--prefix", "none", "--format", "{p}|{f}"])
+            .args(arguments);
+        let mut all: BTreeMap<String, BTreeSet<String>> = BTreeMap::new();
+        let printed = output(tree).unwrap();
+        // An empty line parts the packages of the workspace.
+        for line in printed.lines().filter(|line| !line.is_empty()) {
+            let (package, features) = line.split_once('|').unwrap();
+            let name = package.split(" (").next().unwrap();
+            let features = features.trim_end_matches(" (*)");
+            all.entry(name.to_owned())
+                .or_default()
+                .insert(features.to_owned());
+        }
+        all
+    }
+
+    #[test]
+    fn a_wheel_beside_the_tests_is_built_of_what_they_are_built_of() {
+        let package = ["--package", "muslip-python", "--edges", "normal,build"];
+        let of_wheel = |features| built(&[&package[..], &["--features", features]].concat());
+        let needed = of_wheel("extension-module");
+        let wheel = of_wheel(BESIDE_TESTS);
+        let tests = built(&[
+            "--workspace",
+            "--edges",
+            "normal,build,dev",
+            "--features",
+            TESTED_FEATURES,
+        ]);
+        assert!(needed.len() > 100, "{}", needed.len());
+        for name in needed.keys() {
+            if !name.starts_with("muslip-python ") {
+                assert_eq!(wheel[name], tests[name], "{name}: python/Cargo.toml");
+            }
+        }
     }
 }

@@ -38,8 +38,10 @@ const WITH_FEATURES: &[&str] = &[
     "muslip-quarter-car",
     "muslip-compensate",
 ];
-/// Tests that exist only with these on run with all others: a feature changes no number.
-const TESTED_FEATURES: &str = "muslip/serde,muslip/nalgebra,muslip-laws/serde";
+/// Tests that exist only with these on run with all others: a feature changes no number. The last one is the wheel's, which is
+/// built beside them.
+pub const TESTED_FEATURES: &str =
+    "muslip/serde,muslip/nalgebra,muslip-laws/serde,muslip-python/extension-module";
 
 /// Sums of the test harness's result lines.
 #[derive(Debug, Default, Clone, Copy, PartialEq, Eq)]
@@ -70,7 +72,7 @@ pub fn run_all() -> Result<()> {
         Ok(tally)
     })?;
 
-    python::test(&trial::under_test(), python::FEATURES)?;
+    python::test(&trial::under_test(), python::BESIDE_TESTS)?;
 
     trial::small()?;
 
