@@ -12,7 +12,7 @@ use crate::innovations::candidates::{Candidate, Table, table};
 use crate::innovations::dependence::Dependence;
 use crate::innovations::gram::total;
 use crate::innovations::hypothesis::{
-    Beside, Effort, Noise, judge_added, noise_stride, table_grams,
+    Beside, Effort, Judged, Noise, judge_added, noise_stride, table_grams,
 };
 use crate::innovations::noise::Slopes;
 use crate::innovations::rows::tyre_row_of;
@@ -256,6 +256,12 @@ impl Scored {
     }
 }
 
+/// What is judged at its own best, from one start or more.
+struct Finalist {
+    candidate: usize,
+    starts: Vec<Vec<f64>>,
+}
+
 /// All candidates beside the model so far, scored at the sensors' noise and at the fitted one.
 pub struct Screen<'a> {
     data: &'a Data,
@@ -317,15 +323,23 @@ impl<'a> Screen<'a> {
         own.map_or(0.0, |s| s.gain)
     }
 
-    /// Mechanisms that are judged, by candidate and start: the best but those passed over.
-    fn mechanisms(&self, passed: &[Id]) -> Vec<(usize, Vec<f64>)> {
+    /// Mechanisms that are judged: the best but those passed over, each from where either level would have it start.
+    fn mechanisms(&self, passed: &[Id]) -> Vec<Finalist> {
         let candidates = &self.candidates;
-        let mut out: Vec<(usize, Vec<f64>)> = Vec::new();
+        let mut out: Vec<Finalist> = Vec::new();
         for (all, count) in &self.levels {
             for (index, score) in best(self.data, candidates, all, *count, passed) {
                 let candidate = &candidates[index];
-                if !out.iter().any(|f| candidates[f.0].entry == candidate.entry) {
-                    out.push((index, start_of(self.data, candidate, &score)));
+                let start = start_of(self.data, candidate, &score);
+                let same = |f: &&mut Finalist| candidates[f.candidate].entry == candidate.entry;
+                match out.iter_mut().find(same) {
+                    // From another size of the same effect the way leads to the same place.
+                    Some(before) if before.candidate != index => before.starts.push(start),
+                    Some(_) => {}
+                    None => out.push(Finalist {
+                        candidate: index,
+                        starts: vec![start],
+                    }),
                 }
             }
         }
@@ -350,7 +364,11 @@ impl<'a> Screen<'a> {
     /// Every finalist at its own best, best first.
     pub fn trials(&self) -> Vec<Trial> {
         let mut finalists = self.mechanisms(&[]);
-        finalists.extend(self.dependences().into_iter().map(|c| (c, Vec::new())));
+        let free = self.dependences().into_iter();
+        finalists.extend(free.map(|candidate| Finalist {
+            candidate,
+            starts: vec![Vec::new()],
+        }));
         self.judged(&finalists)
     }
 
@@ -359,35 +377,44 @@ impl<'a> Screen<'a> {
         self.judged(&self.mechanisms(passed))
     }
 
-    fn judged(&self, finalists: &[(usize, Vec<f64>)]) -> Vec<Trial> {
+    fn judged(&self, finalists: &[Finalist]) -> Vec<Trial> {
+        let judged = |finalist: &Finalist| {
+            let from = finalist.starts.iter();
+            let each = from.filter_map(|start| self.judged_from(finalist.candidate, start));
+            each.min_by(|a, b| a.1.loss.total_cmp(&b.1.loss))
+                .map(|(claim, judged)| {
+                    let size = self.size(finalist.candidate);
+                    self.before.tried(claim, judged, size)
+                })
+        };
+        let mut trials: Vec<Trial> = finalists.par_iter().filter_map(judged).collect();
+        rank(self.data, &mut trials);
+        trials
+    }
+
+    /// A candidate from one start at its own best.
+    fn judged_from(&self, candidate: usize, start: &[f64]) -> Option<(Claim, Judged)> {
         let data = self.data;
         let so_far = self.before.judged;
-        let first_free = self.candidates.len() - self.free.len();
-        let mut trials: Vec<Trial> = finalists
-            .par_iter()
-            .filter_map(|(index, start)| {
-                let candidate = &self.candidates[*index];
-                let mut model = so_far.model.clone();
-                let mut extra = so_far.extra.clone();
-                let claim = match (candidate.id, candidate.entry) {
-                    (Some(id), Some(entry)) => {
-                        model.terms.push(Term {
-                            entry,
-                            parameters: start.clone(),
-                        });
-                        Claim::Mechanism(id, entry)
-                    }
-                    _ => {
-                        let free = self.free[index - first_free].clone();
-                        extra.push(free.clone());
-                        Claim::Dependence(free)
-                    }
-                };
-                let judged = judge_added(data, &model, &extra, self.before.beside(), effort(data))?;
-                Some(self.before.tried(claim, judged, self.size(*index)))
-            })
-            .collect();
-        rank(data, &mut trials);
-        trials
+        let mut model = so_far.model.clone();
+        let mut extra = so_far.extra.clone();
+        let own = &self.candidates[candidate];
+        let claim = match (own.id, own.entry) {
+            (Some(id), Some(entry)) => {
+                model.terms.push(Term {
+                    entry,
+                    parameters: start.to_vec(),
+                });
+                Claim::Mechanism(id, entry)
+            }
+            _ => {
+                let first_free = self.candidates.len() - self.free.len();
+                let free = self.free[candidate - first_free].clone();
+                extra.push(free.clone());
+                Claim::Dependence(free)
+            }
+        };
+        let judged = judge_added(data, &model, &extra, self.before.beside(), effort(data))?;
+        Some((claim, judged))
     }
 }

@@ -35,12 +35,70 @@ pub struct Place {
     /// Their sum over the balances.
     grams: Vec<[Gram; 2]>,
     sum: Gram,
-    /// With all columns: where the linear model would go from here.
+    /// With all columns.
     solved: Solved,
+    /// Where the linear model would go from here within the bounds, and how far each own parameter would go.
+    within: Within,
     /// Twice the negative log likelihood here, free dependences and the chain's nuisances fitted.
     here: f64,
     /// By what the noise enters is another model's, whatever this one is.
     held: bool,
+}
+
+/// The linear model's best among the places that no parameter at a bound leaves outwards.
+#[derive(Clone)]
+struct Within {
+    /// Sum of squares there.
+    rss: f64,
+    /// The way of each own parameter.
+    steps: Vec<f64>,
+    /// Which own parameters stay where they are.
+    held: Vec<bool>,
+}
+
+impl Within {
+    /// Parameters at a bound that would leave it stay where they are, and the others go as if these were known: the way
+    /// together with them would lead elsewhere.
+    fn new(
+        data: &Data,
+        model: &Model,
+        sum: &Gram,
+        prior: &dyn Fn(usize) -> f64,
+        free: &Solved,
+    ) -> Option<Self> {
+        let bounds = bounds(data, model);
+        let own = own_parameters(model);
+        let p = model.vector();
+        let outwards = |i: usize, step: f64| {
+            let (low, high) = bounds[own[i]];
+            p[own[i]] <= low && step < 0.0 || p[own[i]] >= high && step > 0.0
+        };
+        let mut within = Self {
+            rss: free.rss,
+            steps: free.coefficients.iter().copied().take(own.len()).collect(),
+            held: vec![false; own.len()],
+        };
+        loop {
+            let leave = |i: &usize| !within.held[*i] && outwards(*i, within.steps[*i]);
+            let leaving: Vec<usize> = (0..own.len()).filter(leave).collect();
+            if leaving.is_empty() {
+                return Some(within);
+            }
+            for i in leaving {
+                within.held[i] = true;
+            }
+            let moves = |column: &usize| within.held.get(column - 1) != Some(&true);
+            let chosen: Vec<usize> = (1..sum.products.nrows()).filter(moves).collect();
+            let solved = solve(&sum.products, &chosen, prior)?;
+            within.rss = solved.rss;
+            within.steps = vec![0.0; own.len()];
+            for (at, column) in chosen.iter().enumerate() {
+                if let Some(step) = within.steps.get_mut(column - 1) {
+                    *step = solved.coefficients[at];
+                }
+            }
+        }
+    }
 }
 
 /// What is known of the noise.
@@ -68,7 +126,7 @@ impl Place {
             for _ in 0..SWEEPS {
                 let all = &|_: Balance| true;
                 let own = &mut by_balance;
-                fit_in_turn(data, &table, &mut noise, own, all, effort);
+                fit_in_turn(data, &table, &mut noise, own, &[], all, effort);
             }
         }
         let held = matches!(known, Known::Noise(_));
@@ -90,6 +148,7 @@ impl Place {
         let chosen: Vec<usize> = (1..sum.products.nrows()).collect();
         let solved = solve(&sum.products, &chosen, &prior)?;
         let here = solve(&sum.products, &linear(&table, &model), &prior)?.rss + sum.log_variance;
+        let within = Within::new(data, &model, &sum, &prior, &solved)?;
         Some(Self {
             model,
             noise,
@@ -98,6 +157,7 @@ impl Place {
             grams,
             sum,
             solved,
+            within,
             here,
             held,
         })
@@ -128,7 +188,7 @@ impl Place {
 
     /// Nats that the linear model would still gain.
     fn to_gain(&self) -> f64 {
-        0.5 * (self.here - self.solved.rss - self.sum.log_variance)
+        0.5 * (self.here - self.within.rss - self.sum.log_variance)
     }
 
     /// Negative logarithm of the prior of the noise's sizes.
@@ -136,10 +196,10 @@ impl Place {
         self.noise.parts().iter().map(estimate::penalty).sum()
     }
 
-    /// Negative restricted log likelihood at the best of the linear model: what the noise's sizes are fitted by.
+    /// Negative restricted log likelihood here: not at the best of the linear model, by which the noise's sizes are fitted
+    /// and which may be nowhere near.
     fn restricted_loss(&self) -> f64 {
-        let (log_variance, solved) = (self.sum.log_variance, &self.solved);
-        0.5 * (log_variance + solved.rss + solved.log_det) + self.penalty()
+        0.5 * (self.here + self.solved.log_det) + self.penalty()
     }
 
     /// The same place with the noise fitted to it: its columns, and by what the noise enters, stay what they are.
@@ -155,7 +215,8 @@ impl Place {
             !added || touches(&self.table.columns[balance as usize], columns.clone())
         };
         let (noise, own) = (&mut self.noise, &mut self.by_balance);
-        fit_in_turn(data, &self.table, noise, own, &touched, effort);
+        let held = &self.within.held;
+        fit_in_turn(data, &self.table, noise, own, held, &touched, effort);
         let (noise, own) = (self.noise, self.by_balance);
         Self::at(data, self.model, self.table, noise, own, self.held)
     }
@@ -184,13 +245,13 @@ impl Place {
         let bounds = bounds(data, &self.model);
         let own = own_parameters(&self.model);
         // Parameters that go together go together: the whole way is cut, not the way of one.
-        let share = own.iter().zip(self.solved.coefficients.iter());
+        let share = own.iter().zip(&self.within.steps);
         let share = share
             .map(|(&index, by)| most_of_step(index, bounds[index]) / by.abs())
             .filter(|share| share.is_finite())
             .fold(shrink, f64::min);
         let mut p = self.model.vector();
-        for (&index, by) in own.iter().zip(self.solved.coefficients.iter()) {
+        for (&index, by) in own.iter().zip(&self.within.steps) {
             let (low, high) = bounds[index];
             if by.is_finite() {
                 p[index] = (p[index] + share * by).clamp(low, high);

@@ -72,19 +72,29 @@ pub fn with_sizes(mut fresh: Vec<BalanceParts>, old: &[BalanceParts]) -> Vec<Bal
 /// How often the noise of every balance is fitted in turn where nothing is known of any.
 pub const SWEEPS: usize = 2;
 
+/// Precision, in its column's own, of a coefficient that is known.
+const KNOWN: f64 = 1e9;
+
 /// Fits the noise of one balance after the other, by the likelihood of all: they share the coefficients. `by_balance`
-/// are the inner products of the table's columns under the noise as it is, and then as fitted.
+/// are the inner products of the table's columns under the noise as it is, and then as fitted. Coefficients of the first
+/// columns that are `held` are known: a parameter at its bound has no size of the noise that its way beyond would leave.
 pub fn fit_in_turn(
     data: &Data,
     table: &Table,
     noise: &mut Noise,
     by_balance: &mut [Vec<[Gram; 2]>],
+    held: &[bool],
     touched: &dyn Fn(Balance) -> bool,
     effort: Effort,
 ) {
-    let prior = |i: usize| precision(table, i);
     let mut products: Vec<DMatrix<f64>> =
         by_balance.iter().map(|own| total(own).products).collect();
+    let known = held.iter().enumerate().map(|(i, held)| {
+        let own: f64 = products.iter().map(|of| of[(1 + i, 1 + i)]).sum();
+        if *held { KNOWN * own } else { 0.0 }
+    });
+    let known: Vec<f64> = known.collect();
+    let prior = |i: usize| precision(table, i) + known.get(i.wrapping_sub(1)).unwrap_or(&0.0);
     for at in 0..products.len() {
         let mut part = noise.parts()[at].clone();
         if !touched(part.balance) {
