@@ -123,7 +123,7 @@ fn built_loop() -> Command {
     ])
 }
 
-/// The processor in the loop as the tests have built it.
+/// The processor in the loop as the tests have built it: its package has a test of its own, for which cargo builds it.
 fn loop_under_test() -> Command {
     command(&program(CHECKED, "pil"), &[])
 }

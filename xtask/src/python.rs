@@ -15,7 +15,8 @@ const COMMAND: &str = "MUSLIP_COMMAND";
 /// The features of a wheel that is released.
 const FEATURES: &str = "extension-module";
 
-/// The features of a wheel that is built beside the tests of the workspace, of what these are built of.
+/// The features of a wheel that is built beside the tests of the workspace: of what these are built of, as far as that is what
+/// a released one does.
 pub const BESIDE_TESTS: &str = "extension-module,beside-tests";
 
 /// How much of the proof is part of the tests.
@@ -292,7 +293,7 @@ mod tests {
 
     /// The features of each package that is built, by its name and version.
     fn built(arguments: &[&str]) -> BTreeMap<String, BTreeSet<String>> {
-        let mut tree = cargo(&["tree", "--offline", "--locked", "--no-dedupe"]);
+        let mut tree = cargo(&["tree", "--locked", "--no-dedupe"]);
         tree.args(["--prefix", "none", "--format", "{p}|{f}"])
             .args(arguments);
         let mut all: BTreeMap<String, BTreeSet<String>> = BTreeMap::new();
@@ -310,7 +311,7 @@ mod tests {
     }
 
     #[test]
-    fn a_wheel_beside_the_tests_is_built_of_what_they_are_built_of() {
+    fn a_wheel_beside_the_tests_is_built_of_what_they_are_built_of_but_serde_json() {
         let package = ["--package", "muslip-python", "--edges", "normal,build"];
         let of_wheel = |features| built(&[&package[..], &["--features", features]].concat());
         let needed = of_wheel("extension-module");
@@ -324,8 +325,14 @@ mod tests {
         ]);
         assert!(needed.len() > 100, "{}", needed.len());
         for name in needed.keys() {
+            // A released wheel's: with the tests' it refuses a rig.
+            let other = if name.starts_with("serde_json ") {
+                &needed
+            } else {
+                &tests
+            };
             if !name.starts_with("muslip-python ") {
-                assert_eq!(wheel[name], tests[name], "{name}: python/Cargo.toml");
+                assert_eq!(wheel[name], other[name], "{name}: python/Cargo.toml");
             }
         }
     }

@@ -96,20 +96,26 @@ impl Audit {
         run
     }
 
-    /// Whether the channels show that they come through a chain: what no effect that a simulation lacks makes of them. Slow
-    /// noise of the drag may be the road's.
+    /// What shows that the channels come through a chain: what no effect that a simulation lacks makes of them. Slow noise of
+    /// the drag may be the road's.
     #[must_use]
-    pub fn shows_a_chain(&self) -> bool {
-        self.findings.iter().any(|found| match found.finding {
-            Word::ColouredNoise => found.channel != "drag_force_n",
-            Word::CommonNoise
-            | Word::Quantised
-            | Word::Held
-            | Word::Hum
-            | Word::Ripple
-            | Word::Clock => true,
-            _ => false,
-        })
+    pub fn shown(&self) -> Shown {
+        let any = |coloured: &[&str]| {
+            self.findings.iter().any(|found| match found.finding {
+                Word::ColouredNoise => coloured.contains(&found.channel.as_str()),
+                Word::CommonNoise
+                | Word::Quantised
+                | Word::Held
+                | Word::Hum
+                | Word::Ripple
+                | Word::Clock => true,
+                _ => false,
+            })
+        };
+        Shown {
+            of_any: any(&["wheel_speed_rad_s", "vehicle_speed_m_s", "brake_torque_nm"]),
+            of_wheel: any(&["wheel_speed_rad_s"]),
+        }
     }
 
     /// Whether the vehicle speed passes a filter slower than the other channels'.
@@ -118,6 +124,15 @@ impl Audit {
         let mut findings = self.findings.iter();
         findings.any(|f| f.finding == Word::LowPassed && f.channel == "vehicle_speed_m_s")
     }
+}
+
+/// Whether a chain shows that channels come through.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Shown {
+    /// Any of them.
+    pub of_any: bool,
+    /// The wheel speed: slow noise of the vehicle's alone is that sensor's.
+    pub of_wheel: bool,
 }
 
 /// What the speeds err by, together or the vehicle's alone, and that one's colour.
@@ -248,13 +263,16 @@ mod tests {
     }
 
     #[test]
-    fn slow_noise_of_the_drag_alone_shows_no_chain() {
+    fn slow_noise_of_the_drag_shows_no_chain_and_the_vehicle_s_none_of_the_wheel() {
         let of = |channel| Audit {
             findings: vec![Finding::of(channel, Word::ColouredNoise, (1.0, 0.1), "1")],
             ..Audit::default()
         };
-        assert!(!of("drag_force_n").shows_a_chain());
-        assert!(of("vehicle_speed_m_s").shows_a_chain());
+        assert_eq!(of("drag_force_n").shown(), Shown::default());
+        let of_vehicle = of("vehicle_speed_m_s").shown();
+        assert!(of_vehicle.of_any && !of_vehicle.of_wheel);
+        let of_wheel = of("wheel_speed_rad_s").shown();
+        assert!(of_wheel.of_any && of_wheel.of_wheel);
     }
 
     /// A coasting vehicle whose slip swings, its speeds read late by so many s.

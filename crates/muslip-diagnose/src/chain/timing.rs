@@ -4,7 +4,7 @@ use rayon::prelude::*;
 
 use super::correct::{Lateness, TimingStd};
 use super::held::without_holds;
-use crate::audit::{Audit, Timing as Late};
+use crate::audit::{Audit, Shown, Timing as Late};
 use crate::campaign::{Rig, Run};
 use crate::constants::{
     ALIKE_LATE, ALIKE_LATE_S, AUDIT_REACH, FAR_BETTER, HEARD_S, IN_STEP_S,
@@ -157,15 +157,15 @@ impl Timing {
 
     /// Leaves the drag as late, the brake as early, or else the wheel speed as early, as they are to be explained, or as
     /// another's timing did; by how much the drag, and whether the brake.
-    fn leave_to_physics(&mut self, other: Option<&Self>, chain_shows: bool) -> (Option<f64>, bool) {
+    fn leave_to_physics(&mut self, other: Option<&Self>, chain: Shown) -> (Option<f64>, bool) {
         let drag = other.map_or_else(
-            || self.drag_late(chain_shows),
+            || self.drag_late(chain.of_any),
             |other| (other.drag > 0.0).then_some(other.drag),
         );
         self.leave(drag.unwrap_or(0.0));
         let brake = other.map_or_else(|| self.brake_early(), |other| other.leaves_brake);
         let wheel = other.map_or_else(
-            || drag.is_none() && !brake && self.wheel_early(chain_shows),
+            || drag.is_none() && !brake && self.wheel_early(chain.of_wheel),
             |other| other.wheel_left > 0.0,
         );
         if brake {
@@ -411,7 +411,7 @@ impl<'a> Recorded<'a> {
     ) -> Option<(Data, Timing, Judged)> {
         timing.found = timing.late;
         timing.brake_heard = self.audit.brake_late.std.is_finite();
-        let (drag, brake) = timing.leave_to_physics(start, self.audit.shows_a_chain());
+        let (drag, brake) = timing.leave_to_physics(start, self.audit.shown());
         let wheel = timing.wheel_left > 0.0;
         if drag.is_some() || brake || wheel {
             data = self.at_one_time(timing.late);
@@ -626,7 +626,10 @@ mod tests {
         assert!(early.wheel_early(false) && !early.wheel_early(true));
         let untold = early.untold();
         (early.late.wheel, early.late.wheel_by_turn) = (-0.005, 0.001);
-        assert_eq!(early.leave_to_physics(None, false), (None, false));
+        assert_eq!(
+            early.leave_to_physics(None, Shown::default()),
+            (None, false)
+        );
         assert_eq!(early.wheel.value, 0.0);
         assert_eq!((early.late.wheel, early.late.wheel_by_turn), (0.0, 0.0));
         assert!(early.untold().left && !untold.left);
@@ -642,11 +645,14 @@ mod tests {
         assert!(!vague.wheel_early(false));
         // Not alone: the brake is.
         let mut with_brake = timing(-0.004, 0.0, -0.025);
-        assert_eq!(with_brake.leave_to_physics(None, false), (None, true));
+        assert_eq!(
+            with_brake.leave_to_physics(None, Shown::default()),
+            (None, true)
+        );
         assert_eq!(with_brake.wheel.value, -0.004);
         // An argument by fewer runs does the same.
         let mut fewer = timing(-0.001, 0.005, 0.0);
-        fewer.leave_to_physics(Some(&early), false);
+        fewer.leave_to_physics(Some(&early), Shown::default());
         assert_eq!((fewer.wheel.value, fewer.vehicle.value), (0.0, 0.005));
     }
 
@@ -803,21 +809,30 @@ mod tests {
     #[test]
     fn an_argument_by_fewer_runs_leaves_what_the_one_by_all_runs_does() {
         let mut all = timing(-0.010, -0.011, -0.010);
-        assert_eq!(all.leave_to_physics(None, false), (Some(0.010), false));
+        assert_eq!(
+            all.leave_to_physics(None, Shown::default()),
+            (Some(0.010), false)
+        );
         // By itself it would give this to the chain.
         let mut fewer = timing(-0.010, -0.018, -0.019);
-        assert_eq!(fewer.clone().leave_to_physics(None, false), (None, false));
         assert_eq!(
-            fewer.leave_to_physics(Some(&all), false),
+            fewer.clone().leave_to_physics(None, Shown::default()),
+            (None, false)
+        );
+        assert_eq!(
+            fewer.leave_to_physics(Some(&all), Shown::default()),
             (Some(0.010), false)
         );
         assert!((fewer.wheel.value).abs() < 1e-12 && (fewer.vehicle.value + 0.008).abs() < 1e-12);
         // And this to the brake.
         let mut alone = timing(0.0, 0.0, -0.030);
         let mut late = timing(0.010, 0.011, 0.010);
-        assert_eq!(late.leave_to_physics(None, false), (None, false));
-        assert_eq!(alone.leave_to_physics(Some(&late), false), (None, false));
-        assert_eq!(alone.leave_to_physics(None, false), (None, true));
+        assert_eq!(late.leave_to_physics(None, Shown::default()), (None, false));
+        assert_eq!(
+            alone.leave_to_physics(Some(&late), Shown::default()),
+            (None, false)
+        );
+        assert_eq!(alone.leave_to_physics(None, Shown::default()), (None, true));
     }
 
     #[test]

@@ -258,7 +258,9 @@ impl Scored {
 
 /// What is judged at its own best, from one start or more.
 struct Finalist {
+    /// As the first level that has it among its best would have it.
     candidate: usize,
+    /// Parameters to start from.
     starts: Vec<Vec<f64>>,
 }
 
@@ -334,7 +336,7 @@ impl<'a> Screen<'a> {
                 let same = |f: &&mut Finalist| candidates[f.candidate].entry == candidate.entry;
                 match out.iter_mut().find(same) {
                     // From another size of the same effect the way leads to the same place.
-                    Some(before) if before.candidate != index => before.starts.push(start),
+                    Some(other) if other.candidate != index => other.starts.push(start),
                     Some(_) => {}
                     None => out.push(Finalist {
                         candidate: index,

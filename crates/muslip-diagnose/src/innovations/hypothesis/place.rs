@@ -24,6 +24,9 @@ use crate::model::Model;
 /// Parameters whose step would gain less, in nats, are the best.
 const SMALL_GAIN: f64 = 0.2;
 
+/// Share of its range by which a parameter may lie within its bound and be at it.
+const AT_BOUND: f64 = 1e-9;
+
 /// A model at one place of its parameters under noise of some sizes.
 #[derive(Clone)]
 pub struct Place {
@@ -45,7 +48,8 @@ pub struct Place {
     held: bool,
 }
 
-/// The linear model's best among the places that no parameter at a bound leaves outwards.
+/// The linear model's best among the places within the bounds, as nearly as parameters that are held one after the other
+/// come to it.
 #[derive(Clone)]
 struct Within {
     /// Sum of squares there.
@@ -69,9 +73,13 @@ impl Within {
         let bounds = bounds(data, model);
         let own = own_parameters(model);
         let p = model.vector();
+        // By how much of its range a parameter at a bound would leave it.
         let outwards = |i: usize, step: f64| {
             let (low, high) = bounds[own[i]];
-            p[own[i]] <= low && step < 0.0 || p[own[i]] >= high && step > 0.0
+            let (range, p) = (high - low, p[own[i]]);
+            let leaves = p - low < AT_BOUND * range && step < 0.0
+                || high - p < AT_BOUND * range && step > 0.0;
+            if leaves { step.abs() / range } else { 0.0 }
         };
         let mut within = Self {
             rss: free.rss,
@@ -79,14 +87,16 @@ impl Within {
             held: vec![false; own.len()],
         };
         loop {
-            let leave = |i: &usize| !within.held[*i] && outwards(*i, within.steps[*i]);
-            let leaving: Vec<usize> = (0..own.len()).filter(leave).collect();
-            if leaving.is_empty() {
+            let free = (0..own.len()).filter(|i| !within.held[*i]);
+            let by = free.map(|i| (i, outwards(i, within.steps[i])));
+            let Some((farthest, _)) = by
+                .filter(|(_, by)| *by > 0.0)
+                .max_by(|a, b| a.1.total_cmp(&b.1))
+            else {
                 return Some(within);
-            }
-            for i in leaving {
-                within.held[i] = true;
-            }
+            };
+            // One at a time: without it the others may not leave.
+            within.held[farthest] = true;
             let moves = |column: &usize| within.held.get(column - 1) != Some(&true);
             let chosen: Vec<usize> = (1..sum.products.nrows()).filter(moves).collect();
             let solved = solve(&sum.products, &chosen, prior)?;
@@ -215,8 +225,8 @@ impl Place {
             !added || touches(&self.table.columns[balance as usize], columns.clone())
         };
         let (noise, own) = (&mut self.noise, &mut self.by_balance);
-        let held = &self.within.held;
-        fit_in_turn(data, &self.table, noise, own, held, &touched, effort);
+        let known = &self.within.held;
+        fit_in_turn(data, &self.table, noise, own, known, &touched, effort);
         let (noise, own) = (self.noise, self.by_balance);
         Self::at(data, self.model, self.table, noise, own, self.held)
     }
