@@ -81,8 +81,8 @@ pub struct Trial {
     /// Whether nothing was named before it in its balance, errors of the speeds left aside, or less than it gains at the
     /// sensors' noise: what a name leaves is easily that name's own form.
     pub first: bool,
-    /// Whether its parameters are the mechanism's own, and not at a limit where its form is another's; and no counter-form
-    /// refutes it.
+    /// Whether its parameters are the mechanism's own, plausible, and not at a limit where its form is another's; and no
+    /// counter-form refutes it.
     pub own: bool,
     /// Another mechanism that its parameters say as well.
     pub says_as_well: Option<Id>,
@@ -258,7 +258,9 @@ impl<'a> Before<'a> {
         let term = term_of(&claim, &judged);
         let own = term.is_none_or(|term| {
             let mechanism = data.catalogue.get(term.entry);
-            mechanism.owns(&term.parameters, &data.context) && !mechanism.facts().counter_form
+            mechanism.owns(&term.parameters, &data.context)
+                && mechanism.is_plausible(&term.parameters, &data.context)
+                && !mechanism.facts().counter_form
         });
         let remembered = term.and_then(|term| self.remembered(term, predicts, at_sensors.1));
         let of_left = remembered.as_ref().is_some_and(|memory| memory.of_left);

@@ -253,6 +253,18 @@ pub trait Describe: Send + Sync {
     fn owns(&self, _parameters: &[f64], _context: &Context) -> bool {
         true
     }
+    /// Whether its size, where it has one, is smaller than the largest plausible: what asks for all of that is something else.
+    fn is_plausible(&self, parameters: &[f64], context: &Context) -> bool {
+        self.facts().amplitude.is_none_or(|size| {
+            let bounds = &self.parameters(context)[size];
+            let (value, highest) = if parameters[size] < 0.0 {
+                (-parameters[size], -bounds.low)
+            } else {
+                (parameters[size], bounds.high)
+            };
+            below_limit(value, highest)
+        })
+    }
     /// Another mechanism that these parameters say as well, and that claims less.
     fn says_as_well(&self, _parameters: &[f64], _context: &Context) -> Option<Id> {
         None
