@@ -300,3 +300,57 @@ pub trait Mechanism<T: Number>: Describe {
     /// The contract's figures from the parameters.
     fn report(&self, p: &[T], fitted: &Fitted<'_, T>) -> Vec<Reported<T>>;
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mechanism::catalogue;
+
+    #[test]
+    fn what_asks_for_the_most_that_is_plausible_is_no_plausible_size() {
+        let context = Context {
+            mass: 1500.0,
+            inertia: 1.0,
+            radius: 0.3,
+            mean_load: 4000.0,
+            nominal: [0.9, 0.1],
+            mean_speed: 20.0,
+            max_speed: 30.0,
+            mean_wheel_speed: 60.0,
+            mean_power: 5e4,
+            total_work: 5e5,
+            mean_brake_power: 5e4,
+            dt: 1e-3,
+            duration: 5.0,
+            total_time: 30.0,
+            runs: 6,
+            distance: 600.0,
+            drag_sigma: 20.0,
+            ..Context::default()
+        };
+        let mut tried = 0;
+        for mechanism in catalogue::<f64>() {
+            let Some(size) = mechanism.facts().amplitude else {
+                continue;
+            };
+            let all = mechanism.parameters(&context);
+            let at = |share: f64| {
+                let middle = |p: &Parameter| 0.5 * (p.low + p.high);
+                let mut p: Vec<f64> = all.iter().map(middle).collect();
+                let bound = if share < 0.0 {
+                    -all[size].low
+                } else {
+                    all[size].high
+                };
+                p[size] = share * bound;
+                mechanism.is_plausible(&p, &context)
+            };
+            assert!(at(0.5) && !at(1.0), "{:?}", mechanism.id());
+            if all[size].low < 0.0 {
+                assert!(at(-0.5) && !at(-1.0), "{:?}", mechanism.id());
+            }
+            tried += 1;
+        }
+        assert!(tried > 20, "{tried}");
+    }
+}

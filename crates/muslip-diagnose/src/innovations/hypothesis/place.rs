@@ -325,3 +325,58 @@ impl Place {
 fn most_of_step(index: usize, (low, high): (f64, f64)) -> f64 {
     if index < 2 { 0.4 } else { 0.25 * (high - low) }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::innovations::toy::{self, EFFORT, settled, stop, with_term};
+    use crate::mechanism::Id;
+
+    /// A stop of a vehicle that is six times as heavy as the rig file says, where more than three times is not plausible,
+    /// and noise to be held.
+    fn heavy() -> (Data, Judged, Noise) {
+        let mut data = stop(toy::Noise::TYPICAL, 4);
+        data.context.mass /= 6.0;
+        let base = settled(&data);
+        let noise = Noise::new(&data, base.parts.clone());
+        (data, base, noise)
+    }
+
+    /// A grade beside an error of the mass.
+    fn place(data: &Data, base: &Judged, noise: &Noise, grade: f64, mass: f64) -> Place {
+        let mut model = with_term(data, base, Id::GradeOrDrive, grade);
+        let second = with_term(data, base, Id::VehicleInertia, mass);
+        model.terms.extend(second.terms);
+        Place::new(data, model, &[], Known::Noise(noise)).unwrap()
+    }
+
+    #[test]
+    fn with_a_parameter_at_its_bound_the_others_are_at_their_best() {
+        let (data, base, noise) = heavy();
+        for start in [0.0, 1.0, 2.0] {
+            let start = place(&data, &base, &noise, 0.0, start);
+            let best = start.descended(&data, &[], EFFORT.steps).unwrap();
+            let [grade, mass] = [0, 1].map(|i| best.model.terms[i].parameters[0]);
+            assert_eq!(mass, 2.0);
+            assert!(best.to_gain() < SMALL_GAIN, "{}", best.to_gain());
+            let std = best.solved.covariance[(2, 2)].sqrt();
+            for by in [-std, std] {
+                let beside = place(&data, &base, &noise, grade + by, mass).here;
+                assert!(beside > best.here, "{beside} {}", best.here);
+            }
+        }
+    }
+
+    #[test]
+    fn noise_is_fitted_as_if_a_parameter_at_its_bound_were_known() {
+        let (data, base, noise) = heavy();
+        let sought = place(&data, &base, &noise, 0.0, 2.0);
+        let sought = sought.descended(&data, &[], EFFORT.steps).unwrap();
+        let before = sought.restricted_loss();
+        let refitted = sought.refitted(&data, &[], EFFORT, false).unwrap();
+        let after = refitted.restricted_loss();
+        assert!(after < before, "{after} {before}");
+        // The most that a few readings' fit may be off by.
+        assert!(refitted.to_gain() < 5.0, "{}", refitted.to_gain());
+    }
+}
