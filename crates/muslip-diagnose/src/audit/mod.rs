@@ -100,9 +100,9 @@ impl Audit {
     /// the drag may be the road's.
     #[must_use]
     pub fn shown(&self) -> Shown {
-        let any = |coloured: &[&str]| {
+        let any = |by_colour: fn(&str) -> bool| {
             self.findings.iter().any(|found| match found.finding {
-                Word::ColouredNoise => coloured.contains(&found.channel.as_str()),
+                Word::ColouredNoise => by_colour(&found.channel),
                 Word::CommonNoise
                 | Word::Quantised
                 | Word::Held
@@ -113,8 +113,8 @@ impl Audit {
             })
         };
         Shown {
-            of_any: any(&["wheel_speed_rad_s", "vehicle_speed_m_s", "brake_torque_nm"]),
-            of_wheel: any(&["wheel_speed_rad_s"]),
+            of_any: any(|channel| channel != "drag_force_n"),
+            of_wheel: any(|channel| channel == "wheel_speed_rad_s"),
         }
     }
 

@@ -45,7 +45,7 @@ pub struct Place {
     /// Twice the negative log likelihood here, free dependences and the chain's nuisances fitted.
     here: f64,
     /// By what the noise enters is another model's, whatever this one is.
-    held: bool,
+    noise_held: bool,
 }
 
 /// The linear model's best among the places within the bounds, as nearly as parameters that are held one after the other
@@ -77,8 +77,8 @@ impl Within {
         let outwards = |i: usize, step: f64| {
             let (low, high) = bounds[own[i]];
             let (range, p) = (high - low, p[own[i]]);
-            let leaves = p - low < AT_BOUND * range && step < 0.0
-                || high - p < AT_BOUND * range && step > 0.0;
+            let leaves = p - low <= AT_BOUND * range && step < 0.0
+                || high - p <= AT_BOUND * range && step > 0.0;
             if leaves { step.abs() / range } else { 0.0 }
         };
         let mut within = Self {
@@ -139,8 +139,8 @@ impl Place {
                 fit_in_turn(data, &table, &mut noise, own, &[], all, effort);
             }
         }
-        let held = matches!(known, Known::Noise(_));
-        Self::at(data, model, table, noise, by_balance, held)
+        let noise_held = matches!(known, Known::Noise(_));
+        Self::at(data, model, table, noise, by_balance, noise_held)
     }
 
     /// The model with its table and what the noise makes of that.
@@ -150,7 +150,7 @@ impl Place {
         table: Arc<Table>,
         noise: Noise,
         by_balance: Vec<Vec<[Gram; 2]>>,
-        held: bool,
+        noise_held: bool,
     ) -> Option<Self> {
         let prior = |i: usize| precision(&table, i);
         let grams = over_balances(data, &table, &by_balance);
@@ -169,13 +169,13 @@ impl Place {
             solved,
             within,
             here,
-            held,
+            noise_held,
         })
     }
 
     /// Another place under this one's noise.
     fn another(&self, data: &Data, model: Model, extra: &[Dependence]) -> Option<Self> {
-        let known = if self.held {
+        let known = if self.noise_held {
             Known::Noise(&self.noise)
         } else {
             Known::Sizes(self.noise.parts())
@@ -228,7 +228,7 @@ impl Place {
         let known = &self.within.held;
         fit_in_turn(data, &self.table, noise, own, known, &touched, effort);
         let (noise, own) = (self.noise, self.by_balance);
-        Self::at(data, self.model, self.table, noise, own, self.held)
+        Self::at(data, self.model, self.table, noise, own, self.noise_held)
     }
 
     /// At most so many steps towards the best parameters, none uphill.
