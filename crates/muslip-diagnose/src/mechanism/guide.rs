@@ -304,6 +304,34 @@ mod tests {
     }
 
     #[test]
+    fn what_asks_for_the_most_that_is_plausible_is_no_plausible_size() {
+        let context = context();
+        let mut tried = 0;
+        for mechanism in catalogue::<f64>() {
+            let Some(size) = mechanism.facts().amplitude else {
+                continue;
+            };
+            let all = mechanism.parameters(&context);
+            let at = |share: f64| {
+                let mut p: Vec<f64> = all.iter().map(|p| 0.5 * (p.low + p.high)).collect();
+                let bound = if share < 0.0 {
+                    -all[size].low
+                } else {
+                    all[size].high
+                };
+                p[size] = share * bound;
+                mechanism.is_plausible(&p, &context)
+            };
+            assert!(at(0.5) && !at(1.0), "{:?}", mechanism.id());
+            if all[size].low < 0.0 {
+                assert!(at(-0.5) && !at(-1.0), "{:?}", mechanism.id());
+            }
+            tried += 1;
+        }
+        assert!(tried > 20, "{tried}");
+    }
+
+    #[test]
     fn every_id_has_an_entry_and_every_form_the_same_guide() {
         for &id in Id::ALL {
             let entries = id.entries();
