@@ -18,7 +18,7 @@ use crate::data::Data;
 use crate::innovations::dependence::{self, Dependence};
 use crate::innovations::hypothesis::{Guess, Judged, judge, judge_added};
 use crate::looked::Seen;
-use crate::mechanism::{Balance, Id, Kind};
+use crate::mechanism::{Balance, Id};
 use crate::model::Model;
 
 /// How often the noise of a model is fitted anew before others are tried beside it.
@@ -249,9 +249,6 @@ impl Question<'_> {
         let before = Before::new(data, so_far, self.untold, taken_up.at_sensors);
         let screen = Screen::new(data, before, &self.free, self.excluded);
         let mut trials = screen.trials();
-        if !self.untold.by_turn {
-            tell_from_clocks(data, &mut trials);
-        }
         refute(data, &mut trials, &taken_up.refuted);
         self.hold_beside_chain(&[], &mut trials, taken_up);
         // What only the chain remembers has taken the place of other names.
@@ -333,31 +330,6 @@ fn refuted(data: &Data, trials: &[Trial]) -> Vec<Id> {
         .filter(|&(id, weight)| weight - most(id) > softness(weight))
         .map(|own| own.0)
         .collect()
-}
-
-/// Lets a memory of the tyre that the timing is too vague for outlast the chain where it says much more than every memory
-/// of the chain's that was tried, at both levels of the noise: a chain goes by the clock, a tyre by how far it has rolled.
-/// A wheel speed that is late by turn goes by that as well.
-fn tell_from_clocks(data: &Data, trials: &mut [Trial]) {
-    let kind_of_memory = |trial: &Trial| {
-        let (_, entry) = trial.mechanism().filter(|_| trial.remembers)?;
-        let mechanism = data.catalogue.get(entry);
-        (mechanism.id().balance() == Balance::Tyre).then(|| mechanism.guide().kind)
-    };
-    let clocks: Vec<[f64; 2]> = trials
-        .iter()
-        .filter(|t| kind_of_memory(t) == Some(Kind::Chain))
-        .map(|t| [t.gain, t.at_sensors.0].map(|gain| gain.max(0.0)))
-        .collect();
-    if clocks.is_empty() {
-        return;
-    }
-    let own = trials.iter_mut();
-    for trial in own.filter(|t| kind_of_memory(t) == Some(Kind::Tyre)) {
-        let (gain, at_sensors) = (trial.gain, trial.at_sensors.0);
-        let told = |clock: &[f64; 2]| much_more(gain, clock[0]) && much_more(at_sensors, clock[1]);
-        trial.outlasts_chain |= clocks.iter().all(told);
-    }
 }
 
 /// Takes names from trials that these refute, or that were refuted before.
@@ -619,30 +591,6 @@ mod tests {
             10.0,
             Id::SlipHysteresis
         ));
-    }
-
-    #[test]
-    fn a_tyre_s_memory_that_outweighs_all_in_time_is_none_of_the_chain_s() {
-        let data = stop(Noise::TYPICAL, 4);
-        let base = toy::settled(&data);
-        let memory = |id, nats, at_sensors| Trial {
-            remembers: true,
-            outlasts_chain: false,
-            at_sensors: (at_sensors, 3.0),
-            ..of_name(&data, &base, id, nats, 3.0)
-        };
-        let told = |lag: Option<(f64, f64)>| {
-            let mut trials = vec![memory(Id::RelaxationLength, 72.0, 85.0)];
-            trials.extend(lag.map(|(nats, at_sensors)| memory(Id::ForceLag, nats, at_sensors)));
-            tell_from_clocks(&data, &mut trials);
-            trials.iter().map(|t| t.outlasts_chain).collect::<Vec<_>>()
-        };
-        // Much more is a third and 15 nats; of the lag itself nothing is said.
-        assert_eq!(told(Some((2.0, 8.0))), [true, false]);
-        assert_eq!(told(Some((45.0, 8.0))), [false, false]);
-        assert_eq!(told(Some((2.0, 60.0))), [false, false]);
-        // What was not asked cannot be told from.
-        assert_eq!(told(None), [false]);
     }
 
     #[test]
