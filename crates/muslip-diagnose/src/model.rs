@@ -51,6 +51,13 @@ impl Model {
         p
     }
 
+    /// Places in that vector of what is fitted: the base law's two parameters and all of the terms.
+    #[must_use]
+    pub fn free_places(&self) -> Vec<usize> {
+        let of_terms = self.base.len()..self.vector().len();
+        [0, 1].into_iter().chain(of_terms).collect()
+    }
+
     /// The same model with other parameters.
     #[must_use]
     pub fn with(&self, p: &[f64]) -> Self {

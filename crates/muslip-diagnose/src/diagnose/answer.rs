@@ -10,7 +10,6 @@ use crate::decide::{Decision, Trial, could_stand, decide};
 use crate::innovations::hypothesis::{Judged, whole_over_slow};
 use crate::innovations::noise::BalanceParts;
 use crate::mechanism::{Balance, Context, Id};
-use crate::model::TYRE_BASE;
 use crate::number::finite_or_zero;
 use crate::split::Split;
 
@@ -148,7 +147,7 @@ impl<'a> Answer<'a> {
     /// Covariance in the order of the model's whole vector.
     pub(super) fn covariance(&self, judged: &Judged) -> DMatrix<f64> {
         let n = judged.model.vector().len();
-        let own: Vec<usize> = [0, 1].into_iter().chain(TYRE_BASE..n).collect();
+        let own = judged.model.free_places();
         let mut all = DMatrix::zeros(n, n);
         for (i, &a) in own.iter().enumerate() {
             for (j, &b) in own.iter().enumerate() {

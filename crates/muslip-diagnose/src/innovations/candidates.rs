@@ -79,10 +79,7 @@ pub fn table(
     wanted: &dyn Fn(Id) -> bool,
 ) -> Table {
     let runs = data.series.len();
-    let fixed: Vec<usize> = [0, 1]
-        .into_iter()
-        .chain(model.base.len()..model.vector().len())
-        .collect();
+    let fixed = model.free_places();
     let levers = (extra.len() + free.len() > 0).then(|| Levers::new(data, model));
     let columns_of = |dependence: &Dependence, run: usize| {
         let levers = levers.as_ref();

@@ -7,13 +7,7 @@ use crate::innovations::dependence::{Dependence, width};
 use crate::innovations::gram::{Gram, grams};
 use crate::innovations::noise::Slopes;
 use crate::mechanism::Residuals;
-use crate::model::{Model, TYRE_BASE};
-
-/// Places in the model's vector of what is fitted: the base law's two parameters and all of the terms.
-pub fn own_parameters(model: &Model) -> Vec<usize> {
-    let n = model.vector().len();
-    [0, 1].into_iter().chain(TYRE_BASE..n).collect()
-}
+use crate::model::Model;
 
 pub fn bounds(data: &Data, model: &Model) -> Vec<(f64, f64)> {
     let mut all = vec![(f64::NEG_INFINITY, f64::INFINITY); model.base.len()];
@@ -73,13 +67,13 @@ pub fn table_grams(data: &Data, noise: &Noise, table: &Table) -> Vec<[Gram; 2]> 
 
 /// Columns whose coefficients are at their best wherever the model stands: free dependences and the chain's nuisances.
 pub fn linear(table: &Table, model: &Model) -> Vec<usize> {
-    let first = 1 + own_parameters(model).len();
+    let first = 1 + model.free_places().len();
     (first..1 + table.base + table.nuisances.len()).collect()
 }
 
 /// Columns of what was added last: the last dependence's, or the last term's.
 pub fn added_columns(model: &Model, extra: &[Dependence]) -> core::ops::Range<usize> {
-    let terms = 1 + own_parameters(model).len();
+    let terms = 1 + model.free_places().len();
     match extra.split_last() {
         Some((_, before)) => terms + width(before)..terms + width(extra),
         None => {

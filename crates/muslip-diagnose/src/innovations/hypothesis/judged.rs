@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use nalgebra::{DMatrix, DVector};
 
-use super::columns::{own_parameters, table_grams, table_of};
+use super::columns::{table_grams, table_of};
 use super::filtered::Noise;
 use super::unseen::{Unseen, unseen};
 use crate::correction::Levers;
@@ -71,7 +71,7 @@ impl Judged {
     /// Coefficients of each free dependence.
     #[must_use]
     pub fn dependences(&self) -> Vec<(&Dependence, Vec<f64>)> {
-        let mut at = own_parameters(&self.model).len();
+        let mut at = self.model.free_places().len();
         self.extra
             .iter()
             .map(|own| {

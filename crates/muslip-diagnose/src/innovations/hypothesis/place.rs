@@ -4,9 +4,7 @@ use std::sync::Arc;
 
 use nalgebra::DVector;
 
-use super::columns::{
-    added_columns, bounds, grams_by_balance, linear, over_balances, own_parameters, table_of,
-};
+use super::columns::{added_columns, bounds, grams_by_balance, linear, over_balances, table_of};
 use super::filtered::Noise;
 use super::judged::Judged;
 use super::sizes::{Effort, SWEEPS, fit_in_turn, touches, with_sizes};
@@ -71,7 +69,7 @@ impl Within {
         free: &Solved,
     ) -> Option<Self> {
         let bounds = bounds(data, model);
-        let own = own_parameters(model);
+        let own = model.free_places();
         let p = model.vector();
         // By how much of its range a parameter at a bound would leave it.
         let outwards = |i: usize, step: f64| {
@@ -253,7 +251,7 @@ impl Place {
 
     fn stepped(&self, data: &Data, shrink: f64) -> Model {
         let bounds = bounds(data, &self.model);
-        let own = own_parameters(&self.model);
+        let own = self.model.free_places();
         // Parameters that go together go together: the whole way is cut, not the way of one.
         let share = own.iter().zip(&self.within.steps);
         let share = share
@@ -303,7 +301,7 @@ impl Place {
         for (at, &i) in linear.iter().enumerate() {
             coefficients[i - 1] = best.coefficients[at];
         }
-        let k = own_parameters(&self.model).len();
+        let k = self.model.free_places().len();
         Some(Judged {
             loss: 0.5 * (self.sum.log_variance + best.rss) + self.penalty(),
             free: self.model.vector().len() - self.model.base.len() + width(extra),

@@ -1,6 +1,6 @@
 //! How likely a model makes what it was not fitted to.
 
-use super::columns::{bounds, own_parameters};
+use super::columns::bounds;
 use crate::constants::UNREAD_SHARE_OF_RANGE;
 use crate::data::Data;
 use crate::innovations::candidates::Table;
@@ -22,7 +22,7 @@ pub fn unseen(data: &Data, model: &Model, table: &Table, grams: &[[Gram; 2]]) ->
     let sum = total(grams);
     let chosen: Vec<usize> = (1..sum.products.nrows()).collect();
     let bounds = bounds(data, model);
-    let own = own_parameters(model);
+    let own = model.free_places();
     let wide = |i: usize| match own.get(i - 1) {
         Some(&p) => (UNREAD_SHARE_OF_RANGE * (bounds[p].1 - bounds[p].0)).powi(-2),
         None => precision(table, i),
