@@ -207,6 +207,7 @@ impl Timing {
             drag_s,
             brake_s,
             left: self.drag > 0.0 || self.wheel_left > 0.0,
+            by_turn: self.found.wheel_by_turn > SMALL_SHIFT_S,
         }
     }
 }
@@ -223,6 +224,8 @@ pub struct Untold {
     pub brake_s: f64,
     /// Whether the drag was left late, or the wheel speed early, for want of a chain that would make it so.
     pub left: bool,
+    /// Whether the wheel speed is late by turn.
+    pub by_turn: bool,
 }
 
 impl Untold {

@@ -18,7 +18,7 @@ use crate::data::Data;
 use crate::innovations::dependence::{self, Dependence};
 use crate::innovations::hypothesis::{Guess, Judged, judge, judge_added};
 use crate::looked::Seen;
-use crate::mechanism::{Balance, Id};
+use crate::mechanism::{Balance, Id, Kind};
 use crate::model::Model;
 
 /// How often the noise of a model is fitted anew before others are tried beside it.
@@ -249,6 +249,7 @@ impl Question<'_> {
         let before = Before::new(data, so_far, self.untold, taken_up.at_sensors);
         let screen = Screen::new(data, before, &self.free, self.excluded);
         let mut trials = screen.trials();
+        self.tell_from_clocks(&mut trials);
         refute(data, &mut trials, &taken_up.refuted);
         self.hold_beside_chain(&[], &mut trials, taken_up);
         // What only the chain remembers has taken the place of other names.
@@ -261,10 +262,18 @@ impl Question<'_> {
             let mut others = screen.trials_without(&tried);
             self.hold_beside_chain(&trials, &mut others, taken_up);
             trials.extend(others);
+            self.tell_from_clocks(&mut trials);
             refute(data, &mut trials, &taken_up.refuted);
             rank(data, &mut trials);
         }
         (trials, screen.seen())
+    }
+
+    /// The same as [`tell_from_clocks`] where no wheel is late by turn, for that goes by how far it has rolled as well.
+    fn tell_from_clocks(&self, trials: &mut [Trial]) {
+        if !self.untold.by_turn {
+            tell_from_clocks(self.data, trials);
+        }
     }
 
     /// Holds names that stand, or could in another's place, beside each memory of the chain's that outweighs them: torque
@@ -332,6 +341,30 @@ fn refuted(data: &Data, trials: &[Trial]) -> Vec<Id> {
         .collect()
 }
 
+/// Lets a memory of the tyre that the timing is too vague for outlast the chain where it says much more than every memory
+/// of the drag that goes by the clock and was tried, at both levels of the noise: a tyre goes by how far it has rolled.
+fn tell_from_clocks(data: &Data, trials: &mut [Trial]) {
+    let kind_of_memory = |trial: &Trial| {
+        let (_, entry) = trial.mechanism().filter(|_| trial.remembers)?;
+        let mechanism = data.catalogue.get(entry);
+        (mechanism.id().balance() == Balance::Tyre).then(|| mechanism.guide().kind)
+    };
+    let clocks: Vec<[f64; 2]> = trials
+        .iter()
+        .filter(|t| kind_of_memory(t).is_some_and(|kind| kind != Kind::Tyre))
+        .map(|t| [t.gain, t.at_sensors.0].map(|gain| gain.max(0.0)))
+        .collect();
+    if clocks.is_empty() {
+        return;
+    }
+    let own = trials.iter_mut();
+    for trial in own.filter(|t| t.lasts && kind_of_memory(t) == Some(Kind::Tyre)) {
+        let (gain, at_sensors) = (trial.gain, trial.at_sensors.0);
+        let told = |clock: &[f64; 2]| much_more(gain, clock[0]) && much_more(at_sensors, clock[1]);
+        trial.outlasts_chain |= clocks.iter().all(told);
+    }
+}
+
 /// Takes names from trials that these refute, or that were refuted before.
 fn refute(data: &Data, trials: &mut [Trial], before: &[Id]) {
     let now = refuted(data, trials);
@@ -378,7 +411,8 @@ pub fn decide(data: &Data, base: Judged, excluded: &[Id], untold: Untold) -> Dec
         excluded,
         untold,
     };
-    let mut base = settled(data, base);
+    // What it was judged by may know less than the data do now.
+    let mut base = settled(data, under_own_noise(data, base));
     let mut chosen = base.clone();
     let mut rounds = Vec::new();
     let mut seen = Vec::new();
@@ -515,6 +549,7 @@ mod tests {
             says_as_well: None,
             fed_by_chain: false,
             remembers: false,
+            lasts: true,
             outlasts_chain: true,
             beside_chain: true,
             readings: 1,
@@ -591,6 +626,31 @@ mod tests {
             10.0,
             Id::SlipHysteresis
         ));
+    }
+
+    #[test]
+    fn a_tyre_s_memory_that_outweighs_all_in_time_is_none_of_the_chain_s() {
+        let data = stop(Noise::TYPICAL, 4);
+        let base = toy::settled(&data);
+        let memory = |id, nats, at_sensors| Trial {
+            remembers: true,
+            lasts: true,
+            outlasts_chain: false,
+            at_sensors: (at_sensors, 3.0),
+            ..of_name(&data, &base, id, nats, 3.0)
+        };
+        let told = |lag: Option<(f64, f64)>| {
+            let mut trials = vec![memory(Id::RelaxationLength, 72.0, 85.0)];
+            trials.extend(lag.map(|(nats, at_sensors)| memory(Id::ForceLag, nats, at_sensors)));
+            tell_from_clocks(&data, &mut trials);
+            trials.iter().map(|t| t.outlasts_chain).collect::<Vec<_>>()
+        };
+        // Much more is a third and 15 nats; of the lag itself nothing is said.
+        assert_eq!(told(Some((2.0, 8.0))), [true, false]);
+        assert_eq!(told(Some((45.0, 8.0))), [false, false]);
+        assert_eq!(told(Some((2.0, 60.0))), [false, false]);
+        // What was not asked cannot be told from.
+        assert_eq!(told(None), [false]);
     }
 
     #[test]

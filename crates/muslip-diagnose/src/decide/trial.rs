@@ -90,6 +90,8 @@ pub struct Trial {
     pub fed_by_chain: bool,
     /// Whether it is a memory: what was before counts.
     pub remembers: bool,
+    /// Whether that is as long as a recording can show.
+    pub lasts: bool,
     /// Whether its memory is longer than what the chain's own timing was off by, and no longer than the channels show.
     pub outlasts_chain: bool,
     /// Whether it stands beside every memory of the chain's that outweighs it and touches its balance.
@@ -191,6 +193,8 @@ fn unanimous(gains: &[f64]) -> bool {
 
 /// A memory, beside what the chain remembers.
 struct Remembered {
+    /// Whether it is as long as a recording can show.
+    lasts: bool,
     /// Whether it is longer than what the chain's own timing was off by, and no longer than the channels show.
     outlasts_chain: bool,
     /// Whether it is of what the timing left to be explained.
@@ -280,6 +284,7 @@ impl<'a> Before<'a> {
             // No chain feeds a memory of what was left to be explained because none shows.
             fed_by_chain: fed_by_chain == Some(true) && !of_left,
             remembers: remembered.is_some(),
+            lasts: remembered.as_ref().is_none_or(|memory| memory.lasts),
             outlasts_chain: remembered.is_none_or(|memory| memory.outlasts_chain),
             beside_chain: true,
             predicts,
@@ -330,6 +335,7 @@ impl<'a> Before<'a> {
             f64::INFINITY
         };
         Some(Remembered {
+            lasts: memory_s > least_s,
             outlasts_chain: memory_s > least_s.max(chain_s) && memory_s < longest_s,
             of_left,
         })
