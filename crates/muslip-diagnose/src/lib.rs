@@ -15,7 +15,7 @@
 //! | what is kept for the proof | `split` |
 //! | the measuring chain | [`audit`], [`chain`] |
 //! | the simulation and its balances | [`model`], [`mechanism`], [`number`] |
-//! | residuals in level form, their covariance, innovations | `innovations` |
+//! | residuals in level form, their covariance, innovations | `innovations`, `law_error` |
 //! | candidates, finalists, what is named | `decide`, `looked`, `separating` |
 //! | how large, and how sure | `figures`, [`diagnose`](mod@diagnose) |
 //! | location | `locate`, `variable` |
@@ -44,6 +44,7 @@ mod figures;
 pub mod imbalance;
 mod innovations;
 mod law;
+mod law_error;
 mod locate;
 mod looked;
 pub mod mechanism;

@@ -1,9 +1,11 @@
 //! A run as the models use it: cleaned, smoothed, with derived variables.
 
 use core::ops::Range;
+use std::sync::Arc;
 
 use crate::balance::Balance;
 use crate::context::Context;
+use crate::law_error::LawError;
 use crate::slip::{self, slip};
 
 /// A step of so many typical ones is a gap, over which nothing is joined.
@@ -59,6 +61,8 @@ pub struct Series {
     /// What the slow part of the wheel speed lacks of the whole, as a share of itself: an inertia in error scales the whole.
     /// Nothing until names are decided on.
     pub slow_wheel_lacks: f64,
+    /// What tells an error of the law from the drag's own noise. Nothing while the timing is sought.
+    pub law_error: Option<Arc<LawError>>,
     /// Vehicle speed in m/s.
     pub speed: Channel,
     /// Normal force in N.

@@ -61,7 +61,8 @@ impl<'a> Answer<'a> {
         not_asked: Vec<Id>,
     ) -> Option<Self> {
         let recorded = Recorded::new(given.rig, given.runs, audit, kept);
-        let (data, timing, base) = recorded.timed(other.map(|other| &other.timing))?;
+        let (mut data, timing, base) = recorded.timed(other.map(|other| &other.timing))?;
+        data.tell_law_error(&base.parts);
         let reach_factor = other.map_or_else(
             || recorded.best_reach(&timing, data.context.reach_factor),
             |other| other.to_predict.context.reach_factor,

@@ -5,10 +5,12 @@ use std::sync::Arc;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
+use super::blocks::Blocks;
 use super::rows::quiet_force;
 use super::whiten::{Course, DIFFUSE, Kind, MOST, Part, Sizes};
 use crate::audit::colour::Colour;
 use crate::data::Data;
+use crate::law_error::{self, LawError};
 use crate::mechanism::Balance;
 use crate::model::{Model, friction_about};
 use crate::number::finite_or_zero;
@@ -45,6 +47,8 @@ pub struct Source {
     pub log_most: f64,
     /// Whether it is an error of the slip, which enters by the law's slope.
     pub of_slip: bool,
+    /// Whether it is an error of the law, of its slip or its friction, rather than of the reading.
+    pub of_law: bool,
 }
 
 /// Noise of one balance.
@@ -189,6 +193,7 @@ impl Source {
             log_cap: f64::INFINITY,
             log_most: f64::INFINITY,
             of_slip: false,
+            of_law: false,
         }
     }
 
@@ -215,8 +220,32 @@ impl Source {
     fn of_slip(self) -> Self {
         Self {
             of_slip: true,
+            ..self.of_law()
+        }
+    }
+
+    /// The same as an error of the law.
+    fn of_law(self) -> Self {
+        Self {
+            of_law: true,
             ..self
         }
+    }
+
+    /// The same as it enters these blocks of a run, where it has a state that is forgotten or stays.
+    fn state(&self, run: usize, blocks: &Blocks) -> Option<law_error::State> {
+        let memory_s = match self.kind? {
+            Kind::Forgetting(time_s) => time_s,
+            Kind::Constant => f64::INFINITY,
+            _ => return None,
+        };
+        let std = self.log_std.exp();
+        let gain = (0..blocks.time.len()).map(|block| std * self.gain_in(run, block));
+        Some(law_error::State {
+            memory_s,
+            gain: gain.collect(),
+            is_force: self.of_law,
+        })
     }
 }
 
@@ -316,9 +345,13 @@ impl<'a> Sensors<'a> {
             )
             .of_slip(),
             Source::new("drag, coloured", forgetting(0.07), none, 0.1 * self.drag),
-            Source::new("friction, fast", forgetting(0.03), force, 0.003),
-            Source::new("friction, slow", forgetting(0.6), force, 0.001).at_most(0.003),
-            Source::new("friction of a run", OF_A_RUN, force, 0.002).at_most(0.005),
+            Source::new("friction, fast", forgetting(0.03), force, 0.003).of_law(),
+            Source::new("friction, slow", forgetting(0.6), force, 0.001)
+                .at_most(0.003)
+                .of_law(),
+            Source::new("friction of a run", OF_A_RUN, force, 0.002)
+                .at_most(0.005)
+                .of_law(),
             Source::new("zero of a run", OF_A_RUN, none, 0.1 * self.drag)
                 .at_most(0.002 * self.data.context.max_drag),
             Source::new("slip of a run", OF_A_RUN, &gain(&self.slopes.slip), 1e-4)
@@ -413,6 +446,30 @@ impl<'a> Sensors<'a> {
             Source::new("force of a run", OF_A_RUN, &gain(&self.time), 0.001 * force)
                 .at_most(0.002 * force),
         ]
+    }
+}
+
+impl Data {
+    /// Lets an error of the law be told from the drag's own noise, by the noise of the balances as fitted.
+    pub fn tell_law_error(&mut self, parts: &[BalanceParts]) {
+        let Some(tyre) = parts.iter().find(|p| p.balance == Balance::Tyre) else {
+            return;
+        };
+        let of_run = |run: usize| {
+            let blocks = &self.blocks[run][Balance::Tyre as usize];
+            let states = tyre.sources.iter().filter_map(|s| s.state(run, blocks));
+            LawError::new(
+                &blocks.time,
+                &blocks.samples,
+                tyre.white(),
+                states.collect(),
+            )
+        };
+        let runs = 0..self.series.len();
+        let by_run: Vec<LawError> = runs.into_par_iter().map(of_run).collect();
+        for (series, own) in self.series.iter_mut().zip(by_run) {
+            series.law_error = Some(Arc::new(own));
+        }
     }
 }
 

@@ -5,11 +5,12 @@
 //! z = m v + ∫(F + opposing) dt, in N s; F is the reading less what the model says that the load cell adds to the
 //! force in the contact. A constant of z means nothing: the whitening takes each stretch's level as unknown.
 
+use core::iter::zip;
+
 use crate::data::{Catalogue, Data, Listed};
 use crate::mechanism::{Balance, Context, Stage, State};
 use crate::model::{Model, acting, tyre};
 use crate::number::Number;
-use crate::prepare::mean_twice_about;
 use crate::series::{Channel, Series};
 
 /// Rows of one run by balance, in the order tyre, wheel, vehicle.
@@ -84,20 +85,35 @@ pub fn quiet_force(series: &Series, law: &[f64]) -> Vec<f64> {
         .collect()
 }
 
-/// Reach in s of the means of what a law's force is off by.
-const OFF_REACH_S: f64 = 0.01;
-
-/// The same with what the reading says that the law is off by: a few percent, which integrated are more than the speeds'
-/// noise. It is taken over means, for the reading's own noise must not be in it.
-fn calibrated_force(series: &Series, law: &[f64]) -> Vec<f64> {
-    let by_law = quiet_force(series, law);
-    let read = series.drag_smooth.iter().zip(&by_law);
-    let off: Vec<f64> = read.map(|(read, law)| read - law).collect();
-    let mut force = mean_twice_about(&series.time, &off, series.level_segments(), OFF_REACH_S);
-    for (force, law) in force.iter_mut().zip(by_law) {
-        *force += law;
+/// The force by a model of the reading in N, with what the reading says that it is off by: a few percent, which integrated
+/// are more than the speeds' noise. The reading's own noise must not be in it, or what scales the force buys it: a mass
+/// came out as three times itself. Where the tyre's balance is not formed it is as [`quiet_force`] has it.
+fn calibrated_force(series: &Series, by_model: &[f64]) -> Vec<f64> {
+    let mut force = quiet_force(series, by_model);
+    let Some(law_error) = &series.law_error else {
+        return force;
+    };
+    let left: Vec<f64> = zip(&series.drag, by_model).map(|(y, f)| y - f).collect();
+    let off = law_error.at_samples(&series.time, &left);
+    for k in series.tyre.iter().flat_map(Clone::clone) {
+        force[k] = by_model[k] + off[k];
     }
     force
+}
+
+/// What the reading says beyond that in N, its own noise, of what a model leaves of it: nothing where the tyre's balance is
+/// not formed, or no error of the law is told from noise yet.
+#[must_use]
+pub fn noise_of_drag(series: &Series, left: &[f64]) -> Vec<f64> {
+    let Some(law_error) = series.law_error.as_ref().filter(|_| !left.is_empty()) else {
+        return Vec::new();
+    };
+    let off = law_error.at_samples(&series.time, left);
+    let mut noise = vec![0.0; series.len()];
+    for k in series.tyre.iter().flat_map(Clone::clone) {
+        noise[k] = left[k] - off[k];
+    }
+    noise
 }
 
 /// Rows of a model. Terms act on every balance that they touch.
@@ -193,8 +209,8 @@ struct Force<'a, T> {
 impl<'a, T: Number> Force<'a, T> {
     fn new(series: &'a Series, tyre: &State<T>, scaled: bool) -> Self {
         let quiet = || {
-            let by_law: Vec<f64> = tyre.force.iter().map(|f| f.value()).collect();
-            calibrated_force(series, &by_law)
+            let by_model: Vec<f64> = tyre.force.iter().map(|f| f.value()).collect();
+            calibrated_force(series, &by_model)
         };
         let added = tyre.contact.as_ref().map(|contact| {
             let samples = 0..series.len();
@@ -269,7 +285,7 @@ fn vehicle<T: Number>(
 }
 
 /// A level, and the integral of a rate on top of it.
-fn integrated<T: Number>(
+pub fn integrated<T: Number>(
     series: &Series,
     rate: impl Fn(usize) -> T,
     level: impl Fn(usize) -> T,
@@ -305,8 +321,16 @@ mod tests {
 
     #[test]
     fn what_the_reading_says_of_the_law_mends_the_law_and_brings_little_noise() {
-        let data = stop(Noise::TYPICAL, 4);
+        let mut data = stop(Noise::TYPICAL, 4);
         let exact = stop(Noise::NONE, 4);
+        // Friction that comes and goes, as one that is fitted to a law that is off.
+        let mut parts = settled(&data).parts;
+        let fast = parts[0]
+            .sources
+            .iter_mut()
+            .find(|s| s.name == "friction, fast");
+        fast.unwrap().log_std = f64::ln(0.07);
+        data.tell_law_error(&parts);
         let (series, truth) = (&data.series[0], &exact.series[0].drag);
         // The law is exact: what is brought in is the reading's noise.
         let exact = calibrated_force(series, truth);
@@ -337,7 +361,9 @@ mod tests {
                 *force *= 1.2;
             }
         }
-        let model = with_term(&data, &settled(&data), Id::ForceGain, 0.0);
+        let law = settled(&data);
+        data.tell_law_error(&law.parts);
+        let model = with_term(&data, &law, Id::ForceGain, 0.0);
         let judged = judge(&data, &model, &[], Guess::None, EFFORT).unwrap();
         let gain = 1.0 + judged.model.terms[0].parameters[0];
         assert!((gain - 1.2).abs() < 0.02, "{gain}");

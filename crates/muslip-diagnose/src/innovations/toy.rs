@@ -18,21 +18,27 @@ const STEPS: usize = 2000;
 const STEP_S: f64 = 5e-3;
 /// Steps of the simulation in one of the recording.
 const INNER: usize = 10;
+/// Memory of the drag's coloured noise.
+const COLOUR_S: f64 = 0.03;
 
-/// Standard deviations of the channels' white noise.
+/// Standard deviations of the channels' white noise, and of the drag's that has a memory.
 #[derive(Clone, Copy)]
 pub struct Noise {
     pub wheel: f64,
+    pub vehicle: f64,
     pub drag: f64,
+    pub drag_coloured: f64,
     pub load: f64,
     pub torque: f64,
 }
 
 impl Noise {
-    /// Of a common measuring chain: rad/s, N, N, N m.
+    /// Of a common measuring chain: rad/s, m/s, N, N, N, N m.
     pub const TYPICAL: Self = Self {
         wheel: 0.3,
+        vehicle: 1e-4,
         drag: 15.0,
+        drag_coloured: 0.0,
         load: 40.0,
         torque: 5.0,
     };
@@ -44,7 +50,9 @@ impl Noise {
     /// None.
     pub const NONE: Self = Self {
         wheel: 0.0,
+        vehicle: 1e-4,
         drag: 0.0,
+        drag_coloured: 0.0,
         load: 0.0,
         torque: 0.0,
     };
@@ -86,6 +94,7 @@ pub fn stop_with(noise: Noise, lags: Lags, seed: u64) -> Data {
         ..Run::default()
     };
     let mut torques = Vec::new();
+    let (kept, mut drag_coloured) = ((-STEP_S / COLOUR_S).exp(), 0.0);
     let step = STEP_S / INNER as f64;
     let follow = |time_s: f64| {
         if time_s > 0.0 {
@@ -107,8 +116,13 @@ pub fn stop_with(noise: Noise, lags: Lags, seed: u64) -> Data {
         };
         run.time_s.push(time);
         run.wheel_speed_rad_s.push(white(noise.wheel));
-        run.vehicle_speed_m_s.push(v + white(1e-4));
-        run.drag_force_n.push(force(v, omega) + white(noise.drag));
+        run.vehicle_speed_m_s.push(v + white(noise.vehicle));
+        if noise.drag_coloured > 0.0 {
+            drag_coloured *= kept;
+            drag_coloured += white(noise.drag_coloured * (1.0 - kept * kept).sqrt());
+        }
+        let read = force(v, omega) + drag_coloured + white(noise.drag);
+        run.drag_force_n.push(read);
         run.normal_force_n.push(LOAD_N + white(noise.load));
         torques.push(torque + white(noise.torque));
         for _ in 0..INNER {

@@ -335,6 +335,7 @@ mod tests {
     fn heavy() -> (Data, Judged, Noise) {
         let mut data = stop(toy::Noise::TYPICAL, 4);
         data.context.mass /= 6.0;
+        data.tell_law_error(&settled(&data).parts);
         let base = settled(&data);
         let noise = Noise::new(&data, base.parts.clone());
         (data, base, noise)
