@@ -59,7 +59,7 @@ pub struct Series {
     /// Wheel speed in rad/s.
     pub wheel: Channel,
     /// What the slow part of the wheel speed lacks of the whole, as a share of itself: an inertia in error scales the whole.
-    /// Nothing until names are decided on.
+    /// Nothing while the timing is sought.
     pub slow_wheel_lacks: f64,
     /// What tells an error of the law from the drag's own noise. Nothing while the timing is sought.
     pub law_error: Option<Arc<LawError>>,

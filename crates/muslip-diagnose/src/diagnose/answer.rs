@@ -63,6 +63,7 @@ impl<'a> Answer<'a> {
         let recorded = Recorded::new(given.rig, given.runs, audit, kept);
         let (mut data, timing, base) = recorded.timed(other.map(|other| &other.timing))?;
         data.tell_law_error(&base.parts);
+        data.scale_slow_wheel(whole_over_slow(&data, &base));
         let reach_factor = other.map_or_else(
             || recorded.best_reach(&timing, data.context.reach_factor),
             |other| other.to_predict.context.reach_factor,
@@ -94,8 +95,8 @@ impl<'a> Answer<'a> {
         Some(answer.with_whole_level())
     }
 
-    /// The same with all of the level that a name scales: its slow part alone, by which the name was decided on, makes an
-    /// inertia's error come out too large.
+    /// The same with all of the level that a name scales, as the noise that is left has it: names were decided on by what the
+    /// base's makes of it.
     fn with_whole_level(mut self) -> Self {
         let terms = &self.decision.chosen.model.terms;
         let scales = |entry: usize| self.data.catalogue.get(entry).facts().scales_level;

@@ -166,7 +166,7 @@ pub struct Facts {
     pub drawn_over: Against,
     /// Which parameter is its size, where one is: at its null the mechanism is absent.
     pub amplitude: Option<usize>,
-    /// Whether it scales a level that is recorded, which is made of its slow part while names are decided on.
+    /// Whether it scales a level that is recorded, which is made of its slow part.
     pub scales_level: bool,
     /// Whether this form is of what the mechanism is mistaken for, and never named: where it says clearly more, the mechanism
     /// is refuted.
