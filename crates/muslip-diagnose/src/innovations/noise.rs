@@ -11,8 +11,8 @@ use super::whiten::{Course, DIFFUSE, Kind, MOST, Part, Sizes};
 use crate::audit::colour::Colour;
 use crate::data::Data;
 use crate::law_error::{self, LawError};
-use crate::mechanism::Balance;
-use crate::model::{Model, friction_about};
+use crate::mechanism::{Balance, Stage};
+use crate::model::{Model, filtered, friction_about, is_filtered};
 use crate::number::finite_or_zero;
 use crate::series::Series;
 use crate::slip;
@@ -61,7 +61,7 @@ pub struct BalanceParts {
 }
 
 /// How the force on the model's curve changes with what is measured, by run and sample: without what remembers and
-/// what the reading adds.
+/// what the reading adds, but for what is `read`.
 pub struct Slopes {
     /// N per rad/s of the wheel speed.
     pub wheel: Vec<Vec<f64>>,
@@ -73,6 +73,8 @@ pub struct Slopes {
     pub slip: Vec<Vec<f64>>,
     /// Second derivative, in N per 1 of slip squared.
     pub curvature: Vec<Vec<f64>>,
+    /// `force` and `slip` as they are read, where the model's force passes filters.
+    read: Option<[Vec<Vec<f64>>; 2]>,
 }
 
 impl Slopes {
@@ -88,6 +90,7 @@ impl Slopes {
             force: Vec::new(),
             slip: Vec::new(),
             curvature: Vec::new(),
+            read: None,
         };
         for [wheel, speed, force, slip, curvature] in by_run {
             out.wheel.push(wheel);
@@ -96,7 +99,31 @@ impl Slopes {
             out.slip.push(slip);
             out.curvature.push(curvature);
         }
+        if is_filtered(&data.catalogue, model) {
+            // A slip that is off by a constant is so behind a filter of the slip, too: the slope is that beyond it.
+            let read = |of: &[Vec<f64>]| {
+                let runs = data.series.par_iter().zip(of);
+                let read = |(s, change): (&Series, &Vec<f64>)| {
+                    let Data {
+                        catalogue, context, ..
+                    } = data;
+                    filtered(catalogue, model, Stage::Contact, s, context, change.clone())
+                };
+                runs.map(read).collect()
+            };
+            out.read = Some([read(&out.force), read(&out.slip)]);
+        }
         out
+    }
+
+    /// How the reading changes with the friction, as a share of it, where that is off for long: in N.
+    fn force_read(&self) -> &[Vec<f64>] {
+        self.read.as_ref().map_or(&self.force, |read| &read[0])
+    }
+
+    /// How the reading changes with a slip that is off over a run: in N per 1 of slip.
+    fn slip_read(&self) -> &[Vec<f64>] {
+        self.read.as_ref().map_or(&self.slip, |read| &read[1])
     }
 
     /// On one run, in the order of the fields.
@@ -328,6 +355,8 @@ impl<'a> Sensors<'a> {
     fn tyre(&self) -> Vec<Source> {
         let gain = |columns: &[Vec<f64>]| self.by_blocks(Balance::Tyre, columns);
         let (none, force) = (&self.none, &gain(&self.slopes.force));
+        // What stays is read behind the model's filters, as the force is; what is as fast as they are has its own memory.
+        let read = &gain(self.slopes.force_read());
         vec![
             Source::new("white", None, none, self.drag),
             Source::new(
@@ -346,17 +375,22 @@ impl<'a> Sensors<'a> {
             .of_slip(),
             Source::new("drag, coloured", forgetting(0.07), none, 0.1 * self.drag),
             Source::new("friction, fast", forgetting(0.03), force, 0.003).of_law(),
-            Source::new("friction, slow", forgetting(0.6), force, 0.001)
+            Source::new("friction, slow", forgetting(0.6), read, 0.001)
                 .at_most(0.003)
                 .of_law(),
-            Source::new("friction of a run", OF_A_RUN, force, 0.002)
+            Source::new("friction of a run", OF_A_RUN, read, 0.002)
                 .at_most(0.005)
                 .of_law(),
             Source::new("zero of a run", OF_A_RUN, none, 0.1 * self.drag)
                 .at_most(0.002 * self.data.context.max_drag),
-            Source::new("slip of a run", OF_A_RUN, &gain(&self.slopes.slip), 1e-4)
-                .at_most(5e-4)
-                .of_slip(),
+            Source::new(
+                "slip of a run",
+                OF_A_RUN,
+                &gain(self.slopes.slip_read()),
+                1e-4,
+            )
+            .at_most(5e-4)
+            .of_slip(),
         ]
     }
 
@@ -590,9 +624,59 @@ impl BalanceParts {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::innovations::toy::{CRITICAL, Noise, PEAK, stop};
+    use crate::innovations::rows::tyre_row_of;
+    use crate::innovations::toy::{CRITICAL, Noise, PEAK, entry_of, stop};
     use crate::mechanism::Id;
     use crate::model::Term;
+
+    #[test]
+    fn what_is_off_over_a_run_is_read_behind_the_model_s_filters() {
+        let data = stop(Noise::TYPICAL, 5);
+        let mut lagged = Model::of_law(PEAK, CRITICAL);
+        lagged.terms.push(Term {
+            entry: entry_of(&data, Id::ForceLag),
+            parameters: vec![0.05],
+        });
+        let column = &parts(&data, &Slopes::new(&data, &lagged))[0];
+        let column = column
+            .sources
+            .iter()
+            .find(|s| s.name == "friction of a run");
+        let column = &column.unwrap().gain[0];
+        // A percent more friction, as the model itself has it read: the law's first parameter is its logarithm.
+        let blocks = &data.blocks[0][Balance::Tyre as usize];
+        let read = |model: &Model| blocks.mean(&tyre_row_of(&data, model, 0));
+        let mut more = lagged.clone();
+        more.base[0] += 0.01_f64.ln_1p();
+        let (before, after) = (read(&lagged), read(&more));
+        let mut largest = 0.0_f64;
+        for (block, gain) in column.iter().enumerate() {
+            let change = (before[block] - after[block]) / 0.01;
+            assert!((gain - change).abs() < 2.0, "{block}: {gain} {change}");
+            largest = largest.max(change);
+        }
+        assert!(largest > 1000.0, "{largest}");
+    }
+
+    #[test]
+    fn a_slip_that_is_off_over_a_run_is_so_behind_a_filter_of_the_slip() {
+        let data = stop(Noise::TYPICAL, 5);
+        let mut entries = data.catalogue.entries().iter();
+        let of_slip = entries.position(|m| m.id() == Id::RelaxationLength && m.form() == "slip");
+        let mut relaxed = Model::of_law(PEAK, CRITICAL);
+        relaxed.terms.push(Term {
+            entry: of_slip.unwrap(),
+            parameters: vec![2.0],
+        });
+        let slopes = Slopes::new(&data, &relaxed);
+        let column = &parts(&data, &slopes)[0];
+        let column = column.sources.iter().find(|s| s.name == "slip of a run");
+        // The slope is that of the curve at the slip that the filter has passed: it passes none again.
+        let blocks = &data.blocks[0][Balance::Tyre as usize];
+        let slope = blocks.mean(&slopes.slip[0]);
+        let gain = &column.unwrap().gain[0];
+        assert!(core::iter::zip(gain, &slope).all(|(a, b)| (a - b).abs() < 1e-9));
+    }
 
     #[test]
     fn the_slope_is_that_of_the_law_and_of_all_that_terms_make_of_it() {
