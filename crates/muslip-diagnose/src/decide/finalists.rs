@@ -379,6 +379,29 @@ impl<'a> Screen<'a> {
         self.judged(&self.mechanisms(passed))
     }
 
+    /// The same of these mechanisms, whatever the screen has them gain: each form from its best start.
+    pub fn trials_of(&self, ids: &[Id]) -> Vec<Trial> {
+        let mut finalists: Vec<Finalist> = Vec::new();
+        for (entry, mechanism) in self.data.catalogue.entries().iter().enumerate() {
+            if !ids.contains(&mechanism.id()) {
+                continue;
+            }
+            let all = self.levels.iter().flat_map(|(all, _)| all);
+            let own = all.filter(|s| self.candidates[s.candidate].entry == Some(entry));
+            let at_start = |s: &&Score| gain_at_start(self.data, &self.candidates[s.candidate], s);
+            let best = own.max_by(|a, b| at_start(a).total_cmp(&at_start(b)));
+            finalists.extend(best.map(|score| Finalist {
+                candidate: score.candidate,
+                starts: vec![start_of(
+                    self.data,
+                    &self.candidates[score.candidate],
+                    score,
+                )],
+            }));
+        }
+        self.judged(&finalists)
+    }
+
     fn judged(&self, finalists: &[Finalist]) -> Vec<Trial> {
         let judged = |finalist: &Finalist| {
             let from = finalist.starts.iter();
@@ -418,5 +441,38 @@ impl<'a> Screen<'a> {
         };
         let judged = judge_added(data, &model, &extra, self.before.beside(), effort(data))?;
         Some((claim, judged))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::chain::timing::Untold;
+    use crate::innovations::toy::{Noise, settled, stop};
+
+    #[test]
+    fn what_is_asked_for_is_tried_whatever_the_screen_has_it_gain() {
+        let data = stop(Noise::TYPICAL, 4);
+        let base = settled(&data);
+        let untold = Untold {
+            channels_s: 0.0,
+            drag_s: 0.0,
+            brake_s: 0.0,
+            left: false,
+            by_turn: false,
+        };
+        let before = Before::new(&data, &base, untold, 0.0);
+        let screen = Screen::new(&data, before, &[], &[]);
+        // Nothing is missing, so a lag is not among the best.
+        let ids = |trials: &[Trial]| -> Vec<Id> {
+            let all = trials.iter().filter_map(Trial::mechanism);
+            all.map(|own| own.0).collect()
+        };
+        assert!(!ids(&screen.trials()).contains(&Id::ForceLag));
+        let asked = screen.trials_of(&[Id::ForceLag, Id::ForceDelay]);
+        let mut found = ids(&asked);
+        found.sort_unstable();
+        assert_eq!(found, [Id::ForceDelay, Id::ForceLag]);
+        assert!(asked.iter().all(|trial| trial.gain < 0.0));
     }
 }

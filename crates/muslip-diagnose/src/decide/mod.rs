@@ -18,7 +18,7 @@ use crate::data::Data;
 use crate::innovations::dependence::{self, Dependence};
 use crate::innovations::hypothesis::{Guess, Judged, judge, judge_added};
 use crate::looked::Seen;
-use crate::mechanism::{Balance, Id, Kind};
+use crate::mechanism::{Balance, Id, Kind, Memory};
 use crate::model::Model;
 
 /// How often the noise of a model is fitted anew before others are tried beside it.
@@ -249,7 +249,7 @@ impl Question<'_> {
         let before = Before::new(data, so_far, self.untold, taken_up.at_sensors);
         let screen = Screen::new(data, before, &self.free, self.excluded);
         let mut trials = screen.trials();
-        self.tell_from_clocks(&mut trials);
+        self.tell_from_clocks(&screen, &mut trials);
         refute(data, &mut trials, &taken_up.refuted);
         self.hold_beside_chain(&[], &mut trials, taken_up);
         // What only the chain remembers has taken the place of other names.
@@ -262,18 +262,41 @@ impl Question<'_> {
             let mut others = screen.trials_without(&tried);
             self.hold_beside_chain(&trials, &mut others, taken_up);
             trials.extend(others);
-            self.tell_from_clocks(&mut trials);
+            self.tell_from_clocks(&screen, &mut trials);
             refute(data, &mut trials, &taken_up.refuted);
             rank(data, &mut trials);
         }
         (trials, screen.seen())
     }
 
-    /// The same as [`tell_from_clocks`] where no wheel is late by turn, for that goes by how far it has rolled as well.
-    fn tell_from_clocks(&self, trials: &mut [Trial]) {
-        if !self.untold.by_turn {
-            tell_from_clocks(self.data, trials);
+    /// The same as [`tell_from_clocks`] where no wheel is late by turn, for that goes by how far it has rolled as well. Where
+    /// no memory that goes by the clock gains enough to be among the trials, all are tried beside them.
+    fn tell_from_clocks(&self, screen: &Screen<'_>, trials: &mut [Trial]) {
+        let data = self.data;
+        let could_be_told = |t: &Trial| {
+            let of_tyre = memory_of(data, t) == Some(Kind::Tyre);
+            of_tyre && t.lasts && !t.outlasts_chain && says_much_more(t, [0.0; 2])
+        };
+        if self.untold.by_turn || !trials.iter().any(could_be_told) {
+            return;
         }
+        let by_clock = |t: &&Trial| memory_of(data, t).is_some_and(|kind| kind != Kind::Tyre);
+        let mut clocks: Vec<[f64; 2]> = trials.iter().filter(by_clock).map(gains_of).collect();
+        if clocks.is_empty() {
+            let all = clocks_of(data);
+            let tried = screen.trials_of(&all);
+            let is_tried = |id: &Id| {
+                tried
+                    .iter()
+                    .any(|t| t.mechanism().is_some_and(|own| own.0 == *id))
+            };
+            // One that is named already, or is not asked for, tells nothing from itself.
+            if !all.iter().all(is_tried) {
+                return;
+            }
+            clocks.extend(tried.iter().map(gains_of));
+        }
+        tell_from_clocks(data, trials, &clocks);
     }
 
     /// Holds names that stand, or could in another's place, beside each memory of the chain's that outweighs them: torque
@@ -341,27 +364,43 @@ fn refuted(data: &Data, trials: &[Trial]) -> Vec<Id> {
         .collect()
 }
 
+/// Whose memory of the tyre's balance a trial is of.
+fn memory_of(data: &Data, trial: &Trial) -> Option<Kind> {
+    let (_, entry) = trial.mechanism().filter(|_| trial.remembers)?;
+    let mechanism = data.catalogue.get(entry);
+    (mechanism.id().balance() == Balance::Tyre).then(|| mechanism.guide().kind)
+}
+
+/// Memories of the drag that go by the clock.
+fn clocks_of(data: &Data) -> Vec<Id> {
+    let entries = data.catalogue.entries().iter();
+    let clocks = entries.filter(|mechanism| {
+        let guide = mechanism.guide();
+        let of_drag = mechanism.facts().through_force && mechanism.id().balance() == Balance::Tyre;
+        of_drag && guide.memory == Memory::Kernel && guide.kind != Kind::Tyre
+    });
+    let mut ids: Vec<Id> = clocks.map(|mechanism| mechanism.id()).collect();
+    ids.sort_unstable();
+    ids.dedup();
+    ids
+}
+
+/// What a trial gains at both levels of the noise, nats.
+fn gains_of(trial: &Trial) -> [f64; 2] {
+    [trial.gain, trial.at_sensors.0].map(|gain| gain.max(0.0))
+}
+
+/// Whether a trial gains much more than this at both levels of the noise.
+fn says_much_more(trial: &Trial, than: [f64; 2]) -> bool {
+    much_more(trial.gain, than[0]) && much_more(trial.at_sensors.0, than[1])
+}
+
 /// Lets a memory of the tyre that the timing is too vague for outlast the chain where it says much more than every memory
-/// of the drag that goes by the clock and was tried, at both levels of the noise: a tyre goes by how far it has rolled.
-fn tell_from_clocks(data: &Data, trials: &mut [Trial]) {
-    let kind_of_memory = |trial: &Trial| {
-        let (_, entry) = trial.mechanism().filter(|_| trial.remembers)?;
-        let mechanism = data.catalogue.get(entry);
-        (mechanism.id().balance() == Balance::Tyre).then(|| mechanism.guide().kind)
-    };
-    let clocks: Vec<[f64; 2]> = trials
-        .iter()
-        .filter(|t| kind_of_memory(t).is_some_and(|kind| kind != Kind::Tyre))
-        .map(|t| [t.gain, t.at_sensors.0].map(|gain| gain.max(0.0)))
-        .collect();
-    if clocks.is_empty() {
-        return;
-    }
+/// of the drag that goes by the clock, each with what it gains: a tyre goes by how far it has rolled.
+fn tell_from_clocks(data: &Data, trials: &mut [Trial], clocks: &[[f64; 2]]) {
     let own = trials.iter_mut();
-    for trial in own.filter(|t| t.lasts && kind_of_memory(t) == Some(Kind::Tyre)) {
-        let (gain, at_sensors) = (trial.gain, trial.at_sensors.0);
-        let told = |clock: &[f64; 2]| much_more(gain, clock[0]) && much_more(at_sensors, clock[1]);
-        trial.outlasts_chain |= clocks.iter().all(told);
+    for trial in own.filter(|t| t.lasts && memory_of(data, t) == Some(Kind::Tyre)) {
+        trial.outlasts_chain |= clocks.iter().all(|clock| says_much_more(trial, *clock));
     }
 }
 
@@ -639,18 +678,27 @@ mod tests {
             at_sensors: (at_sensors, 3.0),
             ..of_name(&data, &base, id, nats, 3.0)
         };
-        let told = |lag: Option<(f64, f64)>| {
-            let mut trials = vec![memory(Id::RelaxationLength, 72.0, 85.0)];
-            trials.extend(lag.map(|(nats, at_sensors)| memory(Id::ForceLag, nats, at_sensors)));
-            tell_from_clocks(&data, &mut trials);
-            trials.iter().map(|t| t.outlasts_chain).collect::<Vec<_>>()
+        let told = |lag: [f64; 2]| {
+            let mut trials = [
+                memory(Id::RelaxationLength, 72.0, 85.0),
+                memory(Id::ForceLag, 72.0, 85.0),
+            ];
+            tell_from_clocks(&data, &mut trials, &[[0.0; 2], lag]);
+            trials.map(|t| t.outlasts_chain)
         };
         // Much more is a third and 15 nats; of the lag itself nothing is said.
-        assert_eq!(told(Some((2.0, 8.0))), [true, false]);
-        assert_eq!(told(Some((45.0, 8.0))), [false, false]);
-        assert_eq!(told(Some((2.0, 60.0))), [false, false]);
-        // What was not asked cannot be told from.
-        assert_eq!(told(None), [false]);
+        assert_eq!(told([2.0, 8.0]), [true, false]);
+        assert_eq!(told([45.0, 8.0]), [false, false]);
+        assert_eq!(told([2.0, 60.0]), [false, false]);
+    }
+
+    #[test]
+    fn a_lag_a_delay_and_a_mode_of_the_load_cell_go_by_the_clock() {
+        let data = stop(Noise::TYPICAL, 4);
+        assert_eq!(
+            clocks_of(&data),
+            [Id::ForceDelay, Id::ForceLag, Id::StructuralResonance]
+        );
     }
 
     #[test]
