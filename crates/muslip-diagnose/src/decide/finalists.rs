@@ -83,6 +83,18 @@ fn gain_at_start(data: &Data, candidate: &Candidate, score: &Score) -> f64 {
     }
 }
 
+/// The start of one form that gains most as it starts; nothing where it has none.
+fn best_start<'a>(
+    data: &Data,
+    candidates: &[Candidate],
+    all: impl Iterator<Item = &'a Score>,
+    entry: Option<usize>,
+) -> Option<&'a Score> {
+    let at_start = |s: &Score| gain_at_start(data, &candidates[s.candidate], s);
+    let own = all.filter(|s| candidates[s.candidate].entry == entry);
+    own.max_by(|a, b| at_start(a).total_cmp(&at_start(b)))
+}
+
 /// Best candidates of a screen but of the ids passed over: at most `count` ids, at most two forms of each, each form at
 /// its best start; and beside them the counter-forms of these ids.
 fn best(
@@ -92,7 +104,6 @@ fn best(
     count: usize,
     passed: &[Id],
 ) -> Vec<(usize, Score)> {
-    let at_start = |s: &Score| gain_at_start(data, &candidates[s.candidate], s);
     let price = |s: &Score| {
         PRICE_OF_PARAMETER * candidates[s.candidate].columns.len() as f64 + PRICE_OF_NAME
     };
@@ -134,12 +145,7 @@ fn best(
             }
             ids.push(id);
         }
-        let starts = all
-            .iter()
-            .filter(|s| candidates[s.candidate].entry == candidate.entry);
-        let best = starts
-            .max_by(|a, b| at_start(a).total_cmp(&at_start(b)))
-            .unwrap_or(score);
+        let best = best_start(data, candidates, all.iter(), candidate.entry).unwrap_or(score);
         out.push((best.candidate, best.clone()));
     }
     let of_ids = |s: &&Score| {
@@ -387,9 +393,7 @@ impl<'a> Screen<'a> {
                 continue;
             }
             let all = self.levels.iter().flat_map(|(all, _)| all);
-            let own = all.filter(|s| self.candidates[s.candidate].entry == Some(entry));
-            let at_start = |s: &&Score| gain_at_start(self.data, &self.candidates[s.candidate], s);
-            let best = own.max_by(|a, b| at_start(a).total_cmp(&at_start(b)));
+            let best = best_start(self.data, &self.candidates, all, Some(entry));
             finalists.extend(best.map(|score| Finalist {
                 candidate: score.candidate,
                 starts: vec![start_of(

@@ -294,7 +294,7 @@ impl Question<'_> {
             if !all.iter().all(is_tried) {
                 return;
             }
-            clocks.extend(tried.iter().map(gains_of));
+            clocks = tried.iter().map(gains_of).collect();
         }
         tell_from_clocks(data, trials, &clocks);
     }
@@ -396,8 +396,12 @@ fn says_much_more(trial: &Trial, than: [f64; 2]) -> bool {
 }
 
 /// Lets a memory of the tyre that the timing is too vague for outlast the chain where it says much more than every memory
-/// of the drag that goes by the clock, each with what it gains: a tyre goes by how far it has rolled.
+/// of the drag that goes by the clock, each with what it gains: a tyre goes by how far it has rolled. From none nothing is
+/// told.
 fn tell_from_clocks(data: &Data, trials: &mut [Trial], clocks: &[[f64; 2]]) {
+    if clocks.is_empty() {
+        return;
+    }
     let own = trials.iter_mut();
     for trial in own.filter(|t| t.lasts && memory_of(data, t) == Some(Kind::Tyre)) {
         trial.outlasts_chain |= clocks.iter().all(|clock| says_much_more(trial, *clock));
@@ -678,18 +682,21 @@ mod tests {
             at_sensors: (at_sensors, 3.0),
             ..of_name(&data, &base, id, nats, 3.0)
         };
-        let told = |lag: [f64; 2]| {
+        let told_from = |clocks: &[[f64; 2]]| {
             let mut trials = [
                 memory(Id::RelaxationLength, 72.0, 85.0),
                 memory(Id::ForceLag, 72.0, 85.0),
             ];
-            tell_from_clocks(&data, &mut trials, &[[0.0; 2], lag]);
+            tell_from_clocks(&data, &mut trials, clocks);
             trials.map(|t| t.outlasts_chain)
         };
+        let told = |lag| told_from(&[[0.0; 2], lag]);
         // Much more is a third and 15 nats; of the lag itself nothing is said.
         assert_eq!(told([2.0, 8.0]), [true, false]);
         assert_eq!(told([45.0, 8.0]), [false, false]);
         assert_eq!(told([2.0, 60.0]), [false, false]);
+        // What was not asked cannot be told from.
+        assert_eq!(told_from(&[]), [false, false]);
     }
 
     #[test]

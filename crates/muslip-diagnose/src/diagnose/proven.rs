@@ -233,6 +233,11 @@ mod tests {
         assert!(super::refuted(&[LAG], &again, false).is_empty());
         // A prediction in which there is no memory says nothing of one.
         assert!(super::refuted(&[LAG], &again, true).is_empty());
+        let worn = Again {
+            names: vec![WEAR],
+            ..again
+        };
+        assert!(super::refuted(&[LAG, WEAR], &worn, true).is_empty());
     }
 
     #[test]

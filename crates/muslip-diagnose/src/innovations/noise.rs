@@ -101,16 +101,13 @@ impl Slopes {
         }
         if is_filtered(&data.catalogue, model) {
             // A slip that is off by a constant is so behind a filter of the slip, too: the slope is that beyond it.
-            let read = |of: &[Vec<f64>]| {
-                let runs = data.series.par_iter().zip(of);
-                let read = |(s, change): (&Series, &Vec<f64>)| {
-                    let Data {
-                        catalogue, context, ..
-                    } = data;
-                    filtered(catalogue, model, Stage::Contact, s, context, change.clone())
-                };
-                runs.map(read).collect()
+            let Data {
+                catalogue, context, ..
+            } = data;
+            let of_run = |(s, change): (&Series, &Vec<f64>)| {
+                filtered(catalogue, model, Stage::Contact, s, context, change.clone())
             };
+            let read = |all: &[Vec<f64>]| data.series.par_iter().zip(all).map(of_run).collect();
             out.read = Some([read(&out.force), read(&out.slip)]);
         }
         out
@@ -629,6 +626,13 @@ mod tests {
     use crate::mechanism::Id;
     use crate::model::Term;
 
+    /// By what a part of the tyre's balance enters the blocks of the first run.
+    fn gain_in_tyre(data: &Data, slopes: &Slopes, name: &str) -> Vec<f64> {
+        let tyre = &parts(data, slopes)[0];
+        let part = tyre.sources.iter().find(|s| s.name == name);
+        part.unwrap().gain[0].clone()
+    }
+
     #[test]
     fn what_is_off_over_a_run_is_read_behind_the_model_s_filters() {
         let data = stop(Noise::TYPICAL, 5);
@@ -637,12 +641,8 @@ mod tests {
             entry: entry_of(&data, Id::ForceLag),
             parameters: vec![0.05],
         });
-        let column = &parts(&data, &Slopes::new(&data, &lagged))[0];
-        let column = column
-            .sources
-            .iter()
-            .find(|s| s.name == "friction of a run");
-        let column = &column.unwrap().gain[0];
+        let slopes = Slopes::new(&data, &lagged);
+        let column = gain_in_tyre(&data, &slopes, "friction of a run");
         // A percent more friction, as the model itself has it read: the law's first parameter is its logarithm.
         let blocks = &data.blocks[0][Balance::Tyre as usize];
         let read = |model: &Model| blocks.mean(&tyre_row_of(&data, model, 0));
@@ -669,13 +669,11 @@ mod tests {
             parameters: vec![2.0],
         });
         let slopes = Slopes::new(&data, &relaxed);
-        let column = &parts(&data, &slopes)[0];
-        let column = column.sources.iter().find(|s| s.name == "slip of a run");
+        let gain = gain_in_tyre(&data, &slopes, "slip of a run");
         // The slope is that of the curve at the slip that the filter has passed: it passes none again.
         let blocks = &data.blocks[0][Balance::Tyre as usize];
         let slope = blocks.mean(&slopes.slip[0]);
-        let gain = &column.unwrap().gain[0];
-        assert!(core::iter::zip(gain, &slope).all(|(a, b)| (a - b).abs() < 1e-9));
+        assert!(core::iter::zip(&gain, &slope).all(|(a, b)| (a - b).abs() < 1e-9));
     }
 
     #[test]
