@@ -2,4 +2,6 @@
 
 pub mod correct;
 pub mod held;
+pub mod recorded;
 pub mod timing;
+pub mod untold;

@@ -451,7 +451,7 @@ impl<'a> Screen<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::chain::timing::Untold;
+    use crate::chain::untold::Untold;
     use crate::innovations::toy::{Noise, settled, stop};
 
     #[test]

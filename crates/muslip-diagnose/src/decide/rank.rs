@@ -1,6 +1,7 @@
 //! The order of a round's trials.
 
-use super::trial::{Claim, Trial, stands};
+use super::stands::stands;
+use super::trial::{Claim, Trial};
 use crate::constants::{ALIKE_NATS, ALIKE_SHARE, PREDICTED_APART, SOFT_SHARE, SOFTNESS};
 use crate::data::Data;
 

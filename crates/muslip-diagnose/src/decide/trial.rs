@@ -1,14 +1,8 @@
-//! What a claim gains beside the model so far, and whether it stands.
+//! What a claim gains beside the model so far.
 
-use crate::chain::timing::Untold;
+use crate::chain::untold::Untold;
 use crate::constants::{
-    CLEARLY_PREDICTED, DEPENDENCE_WORTH, FEWEST_RUNS_AGREED, INDIFFERENT_NATS,
-    LARGE_GAIN_AT_SENSORS, LARGE_GAIN_OF_DEPENDENCE_AT_SENSORS, LARGE_GAIN_ON_UNSEEN, LEAST_EFFECT,
-    LEAST_GAIN, LEAST_GAIN_AT_SENSORS, LEAST_GAIN_OF_DEPENDENCE_AT_SENSORS, LEAST_MEMORY_S,
-    LEAST_PREDICTED, LEAST_PREDICTED_BY_DEPENDENCE, LEAST_T, LEAST_T_AT_SENSORS,
-    LEAST_T_AT_SENSORS_NOT_FED, LEAST_T_NOT_FED, LEAST_T_OF_AGREED, LEAST_T_OF_DEPENDENCE,
-    LEAST_T_OF_DEPENDENCE_AT_SENSORS, LEAST_T_OF_LARGE, LEAST_T_OF_LIKELIER, LINED_UP_PREDICTED,
-    LINED_UP_PREDICTED_BY_DEPENDENCE, MOST_AGAINST, PRICE_OF_NAME, PRICE_OF_PARAMETER,
+    LEAST_MEMORY_S, LEAST_T, MOST_AGAINST, PRICE_OF_NAME, PRICE_OF_PARAMETER,
     REAL_MEMORY_PREDICTED, REAL_MEMORY_T,
 };
 use crate::data::Data;
@@ -115,25 +109,6 @@ impl Trial {
     #[must_use]
     pub fn mechanism(&self) -> Option<(Id, usize)> {
         self.claim.mechanism()
-    }
-
-    /// How much speaks for it at both levels of the noise: the geometric mean of its gains. Fitted noise that is
-    /// indifferent to what it hides counts for one nat.
-    #[must_use]
-    pub fn weight(&self) -> f64 {
-        let least = if hidden(self) { 1.0 } else { 0.0 };
-        (self.gain.max(least) * self.at_sensors.0.max(0.0)).sqrt()
-    }
-
-    /// What all unseen runs gain by it in nats, at the noise at which it stands: as fitted, or at the sensors' where the
-    /// runs' own differences hide it.
-    #[must_use]
-    pub fn gain_on_unseen_runs(&self, runs: usize) -> f64 {
-        if hidden(self) && !seen_on_unseen_runs(self) {
-            self.at_sensors.0
-        } else {
-            self.unseen.0 * runs as f64
-        }
     }
 
     /// How alike the runs speak for it: the larger t of the two levels, one of signed roots being about twice the plain
@@ -388,159 +363,6 @@ fn least_memory_s(data: &Data, entry: usize, real: bool, left: bool) -> f64 {
     least_s.max(steps * data.context.dt / data.averaged as f64)
 }
 
-/// Gain of the least effect that is worth a name, nats.
-fn worth(trial: &Trial) -> f64 {
-    0.5 * LEAST_EFFECT * LEAST_EFFECT * trial.readings as f64
-}
-
-/// Whether a trial could be named, were it seen: large enough, itself, neither a memory of the chain's nor what one leaves,
-/// and better at predicting.
-fn could_be_named(trial: &Trial) -> bool {
-    trial.size > worth(trial) && is_plausible(trial)
-}
-
-/// Whether nothing says that a trial is something else than its claim.
-fn is_plausible(trial: &Trial) -> bool {
-    let not_of_chain = trial.outlasts_chain && trial.beside_chain;
-    trial.own && not_of_chain && trial.predicts > LEAST_PREDICTED
-}
-
-/// Gain from which a name that unseen runs bear out is seen, nats.
-fn least_gain_of_name(trial: &Trial) -> f64 {
-    if unseen_runs_agree(trial) {
-        0.0
-    } else {
-        LEAST_GAIN
-    }
-}
-
-/// Whether a trial stands.
-#[must_use]
-pub fn stands(trial: &Trial) -> bool {
-    is_seen(trial) && could_be_named(trial)
-}
-
-/// Whether a trial is seen, by the noise as fitted or by the sensors'.
-fn is_seen(trial: &Trial) -> bool {
-    let least_gain = if trial.mechanism().is_some() {
-        least_gain_of_name(trial)
-    } else {
-        DEPENDENCE_WORTH * worth(trial)
-    };
-    trial.gain > least_gain && seen_on_unseen_runs(trial) || hidden(trial)
-}
-
-/// Whether the runs' own differences hide what all runs show at the sensors' noise: then the fitted noise, which may be
-/// theirs, is indifferent.
-fn hidden(trial: &Trial) -> bool {
-    let indifferent = trial.gain > -trial.price - INDIFFERENT_NATS;
-    let gains = trial.gain > 0.0 || (indifferent && trial.mechanism().is_some());
-    trial.first && gains && seen_at_sensors(trial)
-}
-
-/// Whether what unseen runs say is enough by itself: several, alike, of the drag, and of what no measuring chain leaves.
-fn unseen_runs_agree(trial: &Trial) -> bool {
-    let (mean, t) = trial.unseen;
-    let alike = trial.runs >= FEWEST_RUNS_AGREED && mean > 0.0 && t > LEAST_T_OF_AGREED;
-    alike && !trial.fed_by_chain && lowers_drag_s_error(trial.predicts, CLEARLY_PREDICTED)
-}
-
-/// Whether a trial is as good as one that stands but for how alike unseen runs speak for it.
-#[must_use]
-pub fn could_stand(trial: &Trial) -> bool {
-    gains_on_unseen_runs(trial) && could_be_named(trial)
-}
-
-/// Whether a trial takes of the likelihood of one that stands: it stands itself, or does not for its size alone, which may
-/// be little beside nothing but is much beside what is hardly larger.
-#[must_use]
-pub fn rivals(trial: &Trial) -> bool {
-    let small = trial.mechanism().is_some() && is_plausible(trial);
-    stands(trial) || small && is_seen(trial)
-}
-
-/// Whether unseen runs gain, alike or not.
-fn gains_on_unseen_runs(trial: &Trial) -> bool {
-    let (mean, t) = trial.unseen;
-    trial.gain > least_gain_of_name(trial) && mean > 0.0 && t > LEAST_T_OF_LIKELIER
-}
-
-/// Whether a name is of use beside others that were named: whatever it is worth alone was settled when it was taken up.
-#[must_use]
-pub fn needed(trial: &Trial) -> bool {
-    gains_on_unseen_runs(trial) || hidden(trial)
-}
-
-/// Whether unseen runs gain, and alike, where their own differences are no larger than sensors make plausible.
-fn seen_at_sensors(trial: &Trial) -> bool {
-    let (sum, t) = trial.at_sensors;
-    if trial.mechanism().is_some() {
-        // Runs that differ at random do not line up to leave so little of their differences.
-        let lined_up = trial.unanimous[1]
-            && trial.gain > 0.0
-            && lowers_drag_s_error(trial.predicts, LINED_UP_PREDICTED);
-        let large = sum > LARGE_GAIN_AT_SENSORS && t > LEAST_T_OF_LARGE;
-        let plain = trial.gain > 0.0 && t > LEAST_T_AT_SENSORS_NOT_FED;
-        let alike = t > LEAST_T_AT_SENSORS || !trial.fed_by_chain && (large || plain);
-        return sum > LEAST_GAIN_AT_SENSORS && (alike || lined_up);
-    }
-    trial.predicts > LEAST_PREDICTED_BY_DEPENDENCE && dependence_at_sensors(trial)
-}
-
-/// Whether unseen runs gain by a free dependence at the sensors' noise.
-fn dependence_at_sensors(trial: &Trial) -> bool {
-    let (sum, t) = trial.at_sensors;
-    sum > LEAST_GAIN_OF_DEPENDENCE_AT_SENSORS && t > LEAST_T_OF_DEPENDENCE_AT_SENSORS
-}
-
-/// Whether a free dependence that does not stand is still to be told: noise that the sensors do not make plausible
-/// swallows it, and the drag is predicted no better with it, but all runs show it; or few runs reach it, hardly any speaks
-/// against it, and the drag is predicted much better, or better and the gain is large.
-#[must_use]
-pub fn left_open(trial: &Trial) -> bool {
-    let shows = |nats: f64, predicted: f64| {
-        trial.at_sensors.0 > nats && lowers_drag_s_error(trial.predicts, predicted)
-    };
-    let few_show = trial.unanimous[1]
-        && (shows(
-            LEAST_GAIN_OF_DEPENDENCE_AT_SENSORS,
-            LINED_UP_PREDICTED_BY_DEPENDENCE,
-        ) || shows(
-            LARGE_GAIN_OF_DEPENDENCE_AT_SENSORS,
-            LEAST_PREDICTED_BY_DEPENDENCE,
-        ));
-    let shown = dependence_at_sensors(trial) || few_show;
-    trial.mechanism().is_none() && !stands(trial) && shown
-}
-
-/// Whether unseen runs gain, and alike.
-fn seen_on_unseen_runs(trial: &Trial) -> bool {
-    let (mean, t) = trial.unseen;
-    match trial.claim {
-        Claim::Mechanism(..) => {
-            let clearly = lowers_drag_s_error(trial.predicts, CLEARLY_PREDICTED);
-            let not_fed = !trial.fed_by_chain || mean * trial.runs as f64 > LARGE_GAIN_ON_UNSEEN;
-            let least = if clearly && not_fed {
-                LEAST_T_NOT_FED
-            } else {
-                LEAST_T
-            };
-            mean > 0.0 && (t >= least || trial.unanimous[0] && clearly)
-        }
-        // What says nothing of what it is has to be seen at the sensors' noise as well: fitted noise may have left it.
-        Claim::Dependence(_) => {
-            let at_sensors = trial.at_sensors.1 > LEAST_T_OF_DEPENDENCE_AT_SENSORS;
-            mean > 0.0 && t >= LEAST_T_OF_DEPENDENCE && at_sensors
-        }
-    }
-}
-
-/// Whether the drag's mean square error falls by more than this logarithm. What does not work through the force predicts
-/// no drag, however well it does.
-fn lowers_drag_s_error(predicts: f64, least: f64) -> bool {
-    predicts.is_finite() && predicts > least
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -550,13 +372,6 @@ mod tests {
             runs: runs.to_vec(),
             halves: halves.to_vec(),
         }
-    }
-
-    #[test]
-    fn what_predicts_no_drag_lowers_no_error_of_it() {
-        assert!(lowers_drag_s_error(0.3, CLEARLY_PREDICTED));
-        assert!(!lowers_drag_s_error(0.2, CLEARLY_PREDICTED));
-        assert!(!lowers_drag_s_error(f64::INFINITY, CLEARLY_PREDICTED));
     }
 
     #[test]

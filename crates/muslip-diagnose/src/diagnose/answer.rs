@@ -4,7 +4,8 @@ use nalgebra::DMatrix;
 
 use crate::audit::Audit;
 use crate::campaign::{Rig, Run};
-use crate::chain::timing::{Recorded, Timing};
+use crate::chain::recorded::Recorded;
+use crate::chain::timing::Timing;
 use crate::data::Data;
 use crate::decide::{Decision, Trial, could_stand, decide};
 use crate::innovations::hypothesis::{Judged, whole_over_slow};

@@ -1,0 +1,139 @@
+//! One round: what is tried beside the model so far, and what of it is the chain's.
+
+use super::finalists::{Screen, effort};
+use super::memory::{clocks_of, gains_of, memory_of, outweighs, says_much_more, tell_from_clocks};
+use super::next::{TakenUp, could_be_taken, next, touches};
+use super::rank::rank;
+use super::refuted::refute;
+use super::settled::{settled, under_own_noise};
+use super::stands::{could_stand, stands};
+use super::trial::{Before, Trial};
+use crate::chain::untold::Untold;
+use crate::data::Data;
+use crate::innovations::dependence::Dependence;
+use crate::innovations::hypothesis::{Judged, judge_added};
+use crate::looked::Seen;
+use crate::mechanism::{Id, Kind};
+
+/// What every round is held with.
+pub struct Question<'a> {
+    pub data: &'a Data,
+    pub free: Vec<Dependence>,
+    pub excluded: &'a [Id],
+    pub untold: Untold,
+}
+
+impl Question<'_> {
+    /// One round beside a model: all trials, best first, and how large each mechanism would have to be to be seen.
+    pub fn round(&self, so_far: &Judged, taken_up: &TakenUp) -> (Vec<Trial>, Vec<Seen>) {
+        let data = self.data;
+        let before = Before::new(data, so_far, self.untold, taken_up.at_sensors);
+        let screen = Screen::new(data, before, &self.free, self.excluded);
+        let mut trials = screen.trials();
+        self.tell_from_clocks(&screen, &mut trials);
+        refute(data, &mut trials, &taken_up.refuted);
+        self.hold_beside_chain(&[], &mut trials, taken_up);
+        // What only the chain remembers has taken the place of other names.
+        let of_chain = trials.iter().any(|t| !t.outlasts_chain);
+        if of_chain && next(data, &trials, taken_up).is_none() {
+            let tried: Vec<Id> = trials
+                .iter()
+                .filter_map(|t| Some(t.mechanism()?.0))
+                .collect();
+            let mut others = screen.trials_without(&tried);
+            self.hold_beside_chain(&trials, &mut others, taken_up);
+            trials.extend(others);
+            self.tell_from_clocks(&screen, &mut trials);
+            refute(data, &mut trials, &taken_up.refuted);
+            rank(data, &mut trials);
+        }
+        (trials, screen.seen())
+    }
+
+    /// The same as [`tell_from_clocks`] where no wheel is late by turn, for that goes by how far it has rolled as well. Where
+    /// no memory that goes by the clock gains enough to be among the trials, all are tried beside them.
+    fn tell_from_clocks(&self, screen: &Screen<'_>, trials: &mut [Trial]) {
+        let data = self.data;
+        let could_be_told = |t: &Trial| {
+            let of_tyre = memory_of(data, t) == Some(Kind::Tyre);
+            of_tyre && t.lasts && !t.outlasts_chain && says_much_more(t, [0.0; 2])
+        };
+        if self.untold.by_turn || !trials.iter().any(could_be_told) {
+            return;
+        }
+        let by_clock = |t: &&Trial| memory_of(data, t).is_some_and(|kind| kind != Kind::Tyre);
+        let mut clocks: Vec<[f64; 2]> = trials.iter().filter(by_clock).map(gains_of).collect();
+        if clocks.is_empty() {
+            let all = clocks_of(data);
+            let tried = screen.trials_of(&all);
+            let is_tried = |id: &Id| {
+                tried
+                    .iter()
+                    .any(|t| t.mechanism().is_some_and(|own| own.0 == *id))
+            };
+            // One that is named already, or is not asked for, tells nothing from itself.
+            if !all.iter().all(is_tried) {
+                return;
+            }
+            clocks = tried.iter().map(gains_of).collect();
+        }
+        tell_from_clocks(data, trials, &clocks);
+    }
+
+    /// Holds names that stand, or could in another's place, beside each memory of the chain's that outweighs them: torque
+    /// or drag that comes late is an inertia, too, where nothing else is asked. Memories are among the trials and those
+    /// `beside` them.
+    fn hold_beside_chain(&self, beside: &[Trial], trials: &mut [Trial], taken_up: &TakenUp) {
+        let data = self.data;
+        let of_chain = |t: &&Trial| !t.outlasts_chain;
+        let memories: Vec<Trial> = trials
+            .iter()
+            .chain(beside)
+            .filter(of_chain)
+            .cloned()
+            .collect();
+        for memory in memories {
+            let of_memory = touches(data, &memory);
+            let outweighed = |trial: &&mut Trial| {
+                let named = trial.mechanism().is_some() && could_be_taken(trial);
+                named
+                    && !trial.remembers
+                    && of_memory.contains(&trial.claim.balance(data))
+                    && outweighs(&memory, trial)
+            };
+            let mut outweighed = trials.iter_mut().filter(outweighed).peekable();
+            if outweighed.peek().is_none() {
+                continue;
+            }
+            let with_memory = settled(data, under_own_noise(data, memory.judged.clone()));
+            let at_sensors = taken_up.at_sensors + memory.at_sensors.0.max(0.0);
+            let before = Before::new(data, &with_memory, self.untold, at_sensors);
+            for trial in outweighed {
+                trial.beside_chain = stands_beside(data, trial, &before);
+            }
+        }
+    }
+}
+
+/// Whether a mechanism could still be taken beside a model that has what it was tried without. How large it is was settled
+/// where it was tried; what cannot be judged beside the other is not told from it.
+fn stands_beside(data: &Data, trial: &Trial, before: &Before<'_>) -> bool {
+    let with_other = before.judged;
+    let Some((_, entry)) = trial.mechanism() else {
+        return false;
+    };
+    let mut model = with_other.model.clone();
+    let own = trial.judged.model.terms.iter().filter(|t| t.entry == entry);
+    model.terms.extend(own.cloned());
+    let both = judge_added(
+        data,
+        &model,
+        &with_other.extra,
+        before.beside(),
+        effort(data),
+    );
+    both.is_some_and(|both| {
+        let again = before.tried(trial.claim.clone(), both, trial.size);
+        stands(&again) || !stands(trial) && could_stand(&again)
+    })
+}

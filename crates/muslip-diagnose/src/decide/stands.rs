@@ -1,0 +1,298 @@
+//! Whether a trial stands: whether it is seen, and could be what it claims.
+
+use super::trial::{Claim, Trial};
+use crate::constants::{
+    CLEARLY_PREDICTED, DEPENDENCE_WORTH, FEWEST_RUNS_AGREED, INDIFFERENT_NATS,
+    LARGE_GAIN_AT_SENSORS, LARGE_GAIN_OF_DEPENDENCE_AT_SENSORS, LARGE_GAIN_ON_UNSEEN, LEAST_EFFECT,
+    LEAST_GAIN, LEAST_GAIN_AT_SENSORS, LEAST_GAIN_OF_DEPENDENCE_AT_SENSORS, LEAST_PREDICTED,
+    LEAST_PREDICTED_BY_DEPENDENCE, LEAST_T, LEAST_T_AT_SENSORS, LEAST_T_AT_SENSORS_NOT_FED,
+    LEAST_T_NOT_FED, LEAST_T_OF_AGREED, LEAST_T_OF_DEPENDENCE, LEAST_T_OF_DEPENDENCE_AT_SENSORS,
+    LEAST_T_OF_LARGE, LEAST_T_OF_LIKELIER, LINED_UP_PREDICTED, LINED_UP_PREDICTED_BY_DEPENDENCE,
+};
+
+impl Trial {
+    /// How much speaks for it at both levels of the noise: the geometric mean of its gains. Fitted noise that is
+    /// indifferent to what it hides counts for one nat.
+    #[must_use]
+    pub fn weight(&self) -> f64 {
+        let least = if hidden(self) { 1.0 } else { 0.0 };
+        (self.gain.max(least) * self.at_sensors.0.max(0.0)).sqrt()
+    }
+
+    /// What all unseen runs gain by it in nats, at the noise at which it stands: as fitted, or at the sensors' where the
+    /// runs' own differences hide it.
+    #[must_use]
+    pub fn gain_on_unseen_runs(&self, runs: usize) -> f64 {
+        if hidden(self) && !seen_on_unseen_runs(self) {
+            self.at_sensors.0
+        } else {
+            self.unseen.0 * runs as f64
+        }
+    }
+}
+
+/// Gain of the least effect that is worth a name, nats.
+fn worth(trial: &Trial) -> f64 {
+    0.5 * LEAST_EFFECT * LEAST_EFFECT * trial.readings as f64
+}
+
+/// Whether a trial could be named, were it seen: large enough, itself, neither a memory of the chain's nor what one leaves,
+/// and better at predicting.
+fn could_be_named(trial: &Trial) -> bool {
+    trial.size > worth(trial) && is_plausible(trial)
+}
+
+/// Whether nothing says that a trial is something else than its claim.
+fn is_plausible(trial: &Trial) -> bool {
+    let not_of_chain = trial.outlasts_chain && trial.beside_chain;
+    trial.own && not_of_chain && trial.predicts > LEAST_PREDICTED
+}
+
+/// Gain from which a name that unseen runs bear out is seen, nats.
+fn least_gain_of_name(trial: &Trial) -> f64 {
+    if unseen_runs_agree(trial) {
+        0.0
+    } else {
+        LEAST_GAIN
+    }
+}
+
+/// Whether a trial stands.
+#[must_use]
+pub fn stands(trial: &Trial) -> bool {
+    is_seen(trial) && could_be_named(trial)
+}
+
+/// Whether a trial is seen, by the noise as fitted or by the sensors'.
+fn is_seen(trial: &Trial) -> bool {
+    let least_gain = if trial.mechanism().is_some() {
+        least_gain_of_name(trial)
+    } else {
+        DEPENDENCE_WORTH * worth(trial)
+    };
+    trial.gain > least_gain && seen_on_unseen_runs(trial) || hidden(trial)
+}
+
+/// Whether the runs' own differences hide what all runs show at the sensors' noise: then the fitted noise, which may be
+/// theirs, is indifferent.
+fn hidden(trial: &Trial) -> bool {
+    let indifferent = trial.gain > -trial.price - INDIFFERENT_NATS;
+    let gains = trial.gain > 0.0 || (indifferent && trial.mechanism().is_some());
+    trial.first && gains && seen_at_sensors(trial)
+}
+
+/// Whether what unseen runs say is enough by itself: several, alike, of the drag, and of what no measuring chain leaves.
+fn unseen_runs_agree(trial: &Trial) -> bool {
+    let (mean, t) = trial.unseen;
+    let alike = trial.runs >= FEWEST_RUNS_AGREED && mean > 0.0 && t > LEAST_T_OF_AGREED;
+    alike && !trial.fed_by_chain && lowers_drag_s_error(trial.predicts, CLEARLY_PREDICTED)
+}
+
+/// Whether a trial is as good as one that stands but for how alike unseen runs speak for it.
+#[must_use]
+pub fn could_stand(trial: &Trial) -> bool {
+    gains_on_unseen_runs(trial) && could_be_named(trial)
+}
+
+/// Whether a trial takes of the likelihood of one that stands: it stands itself, or does not for its size alone, which may
+/// be little beside nothing but is much beside what is hardly larger.
+#[must_use]
+pub fn rivals(trial: &Trial) -> bool {
+    let small = trial.mechanism().is_some() && is_plausible(trial);
+    stands(trial) || small && is_seen(trial)
+}
+
+/// Whether unseen runs gain, alike or not.
+fn gains_on_unseen_runs(trial: &Trial) -> bool {
+    let (mean, t) = trial.unseen;
+    trial.gain > least_gain_of_name(trial) && mean > 0.0 && t > LEAST_T_OF_LIKELIER
+}
+
+/// Whether a name is of use beside others that were named: whatever it is worth alone was settled when it was taken up.
+#[must_use]
+pub fn needed(trial: &Trial) -> bool {
+    gains_on_unseen_runs(trial) || hidden(trial)
+}
+
+/// Whether unseen runs gain, and alike, where their own differences are no larger than sensors make plausible.
+fn seen_at_sensors(trial: &Trial) -> bool {
+    let (sum, t) = trial.at_sensors;
+    if trial.mechanism().is_some() {
+        // Runs that differ at random do not line up to leave so little of their differences.
+        let lined_up = trial.unanimous[1]
+            && trial.gain > 0.0
+            && lowers_drag_s_error(trial.predicts, LINED_UP_PREDICTED);
+        let large = sum > LARGE_GAIN_AT_SENSORS && t > LEAST_T_OF_LARGE;
+        let plain = trial.gain > 0.0 && t > LEAST_T_AT_SENSORS_NOT_FED;
+        let alike = t > LEAST_T_AT_SENSORS || !trial.fed_by_chain && (large || plain);
+        return sum > LEAST_GAIN_AT_SENSORS && (alike || lined_up);
+    }
+    trial.predicts > LEAST_PREDICTED_BY_DEPENDENCE && dependence_at_sensors(trial)
+}
+
+/// Whether unseen runs gain by a free dependence at the sensors' noise.
+fn dependence_at_sensors(trial: &Trial) -> bool {
+    let (sum, t) = trial.at_sensors;
+    sum > LEAST_GAIN_OF_DEPENDENCE_AT_SENSORS && t > LEAST_T_OF_DEPENDENCE_AT_SENSORS
+}
+
+/// Whether a free dependence that does not stand is still to be told: noise that the sensors do not make plausible
+/// swallows it, and the drag is predicted no better with it, but all runs show it; or few runs reach it, hardly any speaks
+/// against it, and the drag is predicted much better, or better and the gain is large.
+#[must_use]
+pub fn left_open(trial: &Trial) -> bool {
+    let shows = |nats: f64, predicted: f64| {
+        trial.at_sensors.0 > nats && lowers_drag_s_error(trial.predicts, predicted)
+    };
+    let few_show = trial.unanimous[1]
+        && (shows(
+            LEAST_GAIN_OF_DEPENDENCE_AT_SENSORS,
+            LINED_UP_PREDICTED_BY_DEPENDENCE,
+        ) || shows(
+            LARGE_GAIN_OF_DEPENDENCE_AT_SENSORS,
+            LEAST_PREDICTED_BY_DEPENDENCE,
+        ));
+    let shown = dependence_at_sensors(trial) || few_show;
+    trial.mechanism().is_none() && !stands(trial) && shown
+}
+
+/// Whether unseen runs gain, and alike.
+fn seen_on_unseen_runs(trial: &Trial) -> bool {
+    let (mean, t) = trial.unseen;
+    match trial.claim {
+        Claim::Mechanism(..) => {
+            let clearly = lowers_drag_s_error(trial.predicts, CLEARLY_PREDICTED);
+            let not_fed = !trial.fed_by_chain || mean * trial.runs as f64 > LARGE_GAIN_ON_UNSEEN;
+            let least = if clearly && not_fed {
+                LEAST_T_NOT_FED
+            } else {
+                LEAST_T
+            };
+            mean > 0.0 && (t >= least || trial.unanimous[0] && clearly)
+        }
+        // What says nothing of what it is has to be seen at the sensors' noise as well: fitted noise may have left it.
+        Claim::Dependence(_) => {
+            let at_sensors = trial.at_sensors.1 > LEAST_T_OF_DEPENDENCE_AT_SENSORS;
+            mean > 0.0 && t >= LEAST_T_OF_DEPENDENCE && at_sensors
+        }
+    }
+}
+
+/// Whether the drag's mean square error falls by more than this logarithm. What does not work through the force predicts
+/// no drag, however well it does.
+fn lowers_drag_s_error(predicts: f64, least: f64) -> bool {
+    predicts.is_finite() && predicts > least
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::decide::toy::of_name;
+    use crate::innovations::dependence;
+    use crate::innovations::toy::{self, Noise, stop};
+    use crate::mechanism::Id;
+
+    #[test]
+    fn what_predicts_no_drag_lowers_no_error_of_it() {
+        assert!(lowers_drag_s_error(0.3, CLEARLY_PREDICTED));
+        assert!(!lowers_drag_s_error(0.2, CLEARLY_PREDICTED));
+        assert!(!lowers_drag_s_error(f64::INFINITY, CLEARLY_PREDICTED));
+    }
+
+    #[test]
+    fn a_gain_that_no_chain_leaves_needs_no_more_even_runs_than_what_chains_do_not_feed() {
+        let data = stop(Noise::TYPICAL, 4);
+        let base = toy::settled(&data);
+        // So many nats on each of six unseen runs.
+        let fed = |nats: f64, t: f64| Trial {
+            fed_by_chain: true,
+            predicts: 0.5,
+            ..of_name(&data, &base, Id::StructuralResonance, nats, t)
+        };
+        assert!(stands(&fed(60.0, 1.6)));
+        assert!(!stands(&fed(60.0, 1.4)) && !stands(&fed(40.0, 1.6)));
+        assert!(stands(&fed(40.0, 2.1)));
+    }
+
+    #[test]
+    fn a_dependence_that_few_runs_reach_is_left_open_where_none_speaks_against_it() {
+        let data = stop(Noise::TYPICAL, 4);
+        let base = toy::settled(&data);
+        let free = dependence::all(&data).swap_remove(0);
+        let is_open = |nats, predicts, against: bool| {
+            left_open(&Trial {
+                claim: Claim::Dependence(free.clone()),
+                gain: -5.0,
+                at_sensors: (nats, 1.0),
+                predicts,
+                unanimous: [false, !against],
+                ..of_name(&data, &base, Id::LoadSensitivity, nats, 0.5)
+            })
+        };
+        assert!(is_open(200.0, 0.6, false));
+        assert!(!is_open(200.0, 0.6, true));
+        assert!(!is_open(200.0, 0.4, false) && !is_open(100.0, 0.6, false));
+        // Of a large gain less is asked.
+        assert!(is_open(600.0, 0.1, false));
+        assert!(!is_open(600.0, 0.1, true) && !is_open(600.0, 0.04, false));
+    }
+
+    #[test]
+    fn several_runs_that_agree_on_the_drag_are_enough_where_no_chain_leaves_the_like() {
+        let data = stop(Noise::TYPICAL, 4);
+        let base = toy::settled(&data);
+        let wear = |t: f64, predicts: f64| Trial {
+            predicts,
+            at_sensors: (2.0, 1.0),
+            ..of_name(&data, &base, Id::WearDrift, 2.0, t)
+        };
+        assert!(stands(&wear(3.6, 0.32)) && needed(&wear(3.6, 0.32)));
+        let refused = [
+            wear(2.9, 0.32),
+            wear(3.6, 0.2),
+            // An inertia predicts no drag.
+            wear(3.6, f64::INFINITY),
+            Trial {
+                fed_by_chain: true,
+                ..wear(3.6, 0.32)
+            },
+            Trial {
+                runs: 3,
+                ..wear(3.6, 0.32)
+            },
+            Trial {
+                gain: -0.1,
+                ..wear(3.6, 0.32)
+            },
+        ];
+        assert!(refused.iter().all(|trial| !stands(trial) && !needed(trial)));
+    }
+
+    #[test]
+    fn what_does_not_stand_for_its_size_alone_is_a_rival_of_what_stands() {
+        let data = stop(Noise::TYPICAL, 4);
+        let base = toy::settled(&data);
+        let radius = |nats: f64, t: f64| Trial {
+            at_sensors: (nats, 1.0),
+            predicts: 0.2,
+            ..of_name(&data, &base, Id::EffectiveRadius, nats, t)
+        };
+        let small = |trial: Trial| Trial { size: 0.0, ..trial };
+        assert!(stands(&radius(9.0, 3.0)) && rivals(&radius(9.0, 3.0)));
+        assert!(!stands(&small(radius(9.0, 3.0))) && rivals(&small(radius(9.0, 3.0))));
+        // As large as may be, but not seen.
+        assert!(!rivals(&radius(9.0, 1.2)) && !rivals(&radius(3.0, 2.9)));
+        // Small, and hidden by the runs' own differences.
+        let hidden = Trial {
+            first: true,
+            at_sensors: (60.0, 9.0),
+            ..radius(1.0, 0.0)
+        };
+        assert!(!stands(&small(hidden.clone())) && rivals(&small(hidden)));
+        let refuted = Trial {
+            own: false,
+            ..radius(9.0, 3.0)
+        };
+        assert!(!rivals(&refuted));
+    }
+}
