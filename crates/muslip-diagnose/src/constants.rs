@@ -25,8 +25,8 @@ pub const LEAST_T_NOT_FED: f64 = 1.5;
 pub const LEAST_T_OF_AGREED: f64 = 3.0;
 /// As [`LEAST_T_OF_AGREED`]: fewest unseen runs. With fewer a t of three is chance.
 pub const FEWEST_RUNS_AGREED: usize = 4;
-/// Gain on all unseen runs together, nats, beyond which a measuring chain leaves nothing: with a t between
-/// [`LEAST_T_NOT_FED`] and [`LEAST_T`], what chains feed gained at most 194 on 60 development campaigns with nothing missing.
+/// Gain on all unseen runs together, nats, beyond which a measuring chain leaves nothing: with a t of [`LEAST_T_NOT_FED`] or
+/// more, what does not stand by less gained at most 194 on 120 development campaigns with nothing missing.
 pub const LARGE_GAIN_ON_UNSEEN: f64 = 300.0;
 /// Least t of a name that all recordings together make clearly likelier than one that stands.
 pub const LEAST_T_OF_LIKELIER: f64 = 1.0;
@@ -88,6 +88,8 @@ pub const DOUBTED: f64 = 0.5;
 pub const BEYOND_REFUTATION: f64 = 0.9;
 /// Least confidence of a name that is said, unless an alias is as likely: of 8 below it on the same sets 2 were true.
 pub const LEAST_CONFIDENCE: f64 = 0.45;
+/// Confidence from which a name that says what a channel does is told among the findings of the chain, too.
+pub const TOLD_OF_CHANNEL: f64 = 0.9;
 /// What so many runs can make sure, at least, for an unlikely name to be left unsaid: four do. With fewer no name gets far.
 pub const FEW_RUNS_SURE: f64 = 0.9;
 /// Share of a name's likelihood from which nothing in the recordings tells an alias from it.
@@ -96,7 +98,7 @@ pub const TIED: f64 = 0.99;
 pub const HARDLY_LESS: f64 = 0.37;
 /// Likelihood of what is rare as a share of that of what is common and looks the same.
 pub const RARE_SHARE: f64 = 0.05;
-/// Logarithm of the mean square error by which a prediction is clearly better.
+/// Logarithm of the mean square error by which a prediction is clearly better, or worse.
 pub const PREDICTED_APART: f64 = 0.1;
 /// Share of a name's weight below which its alias, weighed beside it, is what its own form leaves, and a dependence too: forms
 /// of the vocabulary are within some five percent of what they stand for.

@@ -8,6 +8,7 @@ use crate::constants::{
     LEAST_PREDICTED_BY_DEPENDENCE, LEAST_T, LEAST_T_AT_SENSORS, LEAST_T_AT_SENSORS_NOT_FED,
     LEAST_T_NOT_FED, LEAST_T_OF_AGREED, LEAST_T_OF_DEPENDENCE, LEAST_T_OF_DEPENDENCE_AT_SENSORS,
     LEAST_T_OF_LARGE, LEAST_T_OF_LIKELIER, LINED_UP_PREDICTED, LINED_UP_PREDICTED_BY_DEPENDENCE,
+    PREDICTED_APART,
 };
 
 impl Trial {
@@ -45,7 +46,23 @@ fn could_be_named(trial: &Trial) -> bool {
 /// Whether nothing says that a trial is something else than its claim.
 fn is_plausible(trial: &Trial) -> bool {
     let not_of_chain = trial.outlasts_chain && trial.beside_chain;
-    trial.own && not_of_chain && trial.predicts > LEAST_PREDICTED
+    trial.own && not_of_chain && trial.predicts > least_predicted(trial)
+}
+
+/// Least logarithm by which a trial has to lower the mean square error of the drag. Of what gains more than any chain leaves a
+/// prediction says little: what a mode makes of the slip's noise spoils that of the true one, too.
+fn least_predicted(trial: &Trial) -> f64 {
+    if gains_beyond_chain(trial) {
+        -PREDICTED_APART
+    } else {
+        LEAST_PREDICTED
+    }
+}
+
+/// Whether unseen runs together gain more by a name than a measuring chain leaves.
+fn gains_beyond_chain(trial: &Trial) -> bool {
+    let of_runs = trial.unseen.0 * trial.runs as f64;
+    trial.mechanism().is_some() && of_runs > LARGE_GAIN_ON_UNSEEN
 }
 
 /// Gain from which a name that unseen runs bear out is seen, nats.
@@ -162,13 +179,13 @@ fn seen_on_unseen_runs(trial: &Trial) -> bool {
     match trial.claim {
         Claim::Mechanism(..) => {
             let clearly = lowers_drag_s_error(trial.predicts, CLEARLY_PREDICTED);
-            let not_fed = !trial.fed_by_chain || mean * trial.runs as f64 > LARGE_GAIN_ON_UNSEEN;
-            let least = if clearly && not_fed {
+            let large = gains_beyond_chain(trial);
+            let least = if large || clearly && !trial.fed_by_chain {
                 LEAST_T_NOT_FED
             } else {
                 LEAST_T
             };
-            mean > 0.0 && (t >= least || trial.unanimous[0] && clearly)
+            mean > 0.0 && (t >= least || trial.unanimous[0] && (clearly || large))
         }
         // What says nothing of what it is has to be seen at the sensors' noise as well: fitted noise may have left it.
         Claim::Dependence(_) => {
@@ -212,6 +229,20 @@ mod tests {
         assert!(stands(&fed(60.0, 1.6)));
         assert!(!stands(&fed(60.0, 1.4)) && !stands(&fed(40.0, 1.6)));
         assert!(stands(&fed(40.0, 2.1)));
+        // Nor a better prediction: the noise of the slip is worth more behind a mode. Clearly worse is another matter.
+        let predicting = |nats: f64, predicts: f64| Trial {
+            predicts,
+            ..fed(nats, 2.1)
+        };
+        assert!(stands(&predicting(60.0, -0.05)) && !stands(&predicting(40.0, -0.05)));
+        assert!(!stands(&predicting(60.0, -0.15)));
+        // Nor even runs, where few reach what none speaks against.
+        let few = |nats: f64| Trial {
+            unanimous: [true, false],
+            predicts: 0.2,
+            ..fed(nats, 1.2)
+        };
+        assert!(stands(&few(60.0)) && !stands(&few(40.0)));
     }
 
     #[test]

@@ -295,7 +295,8 @@ impl<'a> Before<'a> {
         let of_left = in_force && self.untold.left;
         let alike = t_at_sensors > REAL_MEMORY_T || of_left;
         let real = in_force && predicts > REAL_MEMORY_PREDICTED && alike;
-        let least_s = least_memory_s(data, term.entry, real, of_left);
+        let shown_s = shortest_shown_s(data, term.entry, real);
+        let least_s = shown_s.max(least_memory_s(data, term.entry, of_left));
         // That a memory is real does not say whose it is: one of the tyre must outlast what it leaves to the chain.
         let guide = mechanism.guide();
         let shortest_s = [
@@ -310,7 +311,7 @@ impl<'a> Before<'a> {
             f64::INFINITY
         };
         Some(Remembered {
-            lasts: memory_s > least_s,
+            lasts: memory_s > shown_s,
             outlasts_chain: memory_s > least_s.max(chain_s) && memory_s < longest_s,
             of_left,
         })
@@ -346,21 +347,28 @@ fn squares_by_best_law(data: &Data, judged: &Judged) -> Vec<f64> {
     squares(data, &closest(data, &judged.model, &drags), &drags)
 }
 
-/// Shortest memory in s that is named: a filtered reading of the brake holds less noise than the reading itself, which
-/// looks like a short lag, so there its descriptor's smallest useful effect holds. None is shorter than the recording's
-/// step, or half of it where it is real: how a reading changes between two samples is not known, but what it changes by
-/// from one to the next is. An acceleration takes two steps to be seen, with the torque that enters at both. Of a drag that
-/// is `left` late to be explained the timing's errors are known.
-fn least_memory_s(data: &Data, entry: usize, real: bool, left: bool) -> f64 {
-    let mechanism = data.catalogue.get(entry);
-    let (least_s, steps) = if mechanism.id().balance() == Balance::Wheel {
-        let smallest_s = (mechanism.guide().smallest_size)(&data.context);
-        (smallest_s, 2.0)
-    } else {
-        let least_s = if left { 0.0 } else { LEAST_MEMORY_S };
-        (least_s, if real { 0.5 } else { 1.0 })
+/// Shortest memory in s that a recording shows. None is shorter than its step, or half of it where it is real: how a reading
+/// changes between two samples is not known, but what it changes by from one to the next is. An acceleration takes two steps
+/// to be seen, with the torque that enters at both.
+fn shortest_shown_s(data: &Data, entry: usize, real: bool) -> f64 {
+    let steps = match data.catalogue.get(entry).id().balance() {
+        Balance::Wheel => 2.0,
+        _ if real => 0.5,
+        _ => 1.0,
     };
-    least_s.max(steps * data.context.dt / data.averaged as f64)
+    steps * data.context.dt / data.averaged as f64
+}
+
+/// Shortest memory in s that is told from the chain's by its length: a filtered reading of the brake holds less noise than the
+/// reading itself, which looks like a short lag, so there its descriptor's smallest useful effect holds. Of a drag that is
+/// `left` late to be explained the timing's errors are known.
+fn least_memory_s(data: &Data, entry: usize, left: bool) -> f64 {
+    let mechanism = data.catalogue.get(entry);
+    match mechanism.id().balance() {
+        Balance::Wheel => (mechanism.guide().smallest_size)(&data.context),
+        _ if left => 0.0,
+        _ => LEAST_MEMORY_S,
+    }
 }
 
 #[cfg(test)]

@@ -3,9 +3,10 @@
 use super::answer::{Answer, Given, NameOfForce};
 use super::figures::{fit_of, traces};
 use super::model_out::Predicts;
-use crate::audit::Audit;
-use crate::constants::{BEYOND_REFUTATION, DOUBTED};
-use crate::mechanism::{Balance, Id};
+use crate::audit::{Audit, Finding};
+use crate::constants::{BEYOND_REFUTATION, DOUBTED, TOLD_OF_CHANNEL};
+use crate::data::Catalogue;
+use crate::mechanism::{Balance, Describe, Id};
 use crate::outcome::{Diagnosis, Fit, NamedMechanism, Verdict};
 use crate::proof::Predicted;
 use crate::repaired::{Predicting, Repaired};
@@ -126,6 +127,7 @@ impl<'a> Proven<'a> {
         }
         // What is no likelier than not, or not borne out by unseen runs, is not the strongest, whatever it gained.
         mechanisms.sort_by_key(|named| named.evidence.confidence <= DOUBTED);
+        let chain = with_named(answer.audit.chain(), &mechanisms, &answer.data.catalogue);
         let unexplained = answer.unexplained();
         let verdict = match (mechanisms.is_empty(), unexplained.is_empty()) {
             (true, true) => Verdict::Consistent,
@@ -150,7 +152,7 @@ impl<'a> Proven<'a> {
             unexplained,
             looked_for: answer.looked_for(),
             data_faults: answer.given.faults(&self.kept),
-            chain: answer.audit.chain(),
+            chain,
             caveats: answer.caveats(&self.kept),
             traces: traces(&self.kept, &self.predicted, answer.data.context.radius),
             fit: self.fit,
@@ -162,6 +164,31 @@ impl<'a> Proven<'a> {
             found: self.found,
         }
     }
+}
+
+/// What the audit says of the channels, and what names do that say what a channel does: an encoder's ripple, a filter of the
+/// drag. Without the tyre law, which these need to be seen by, the audit may not find them.
+fn with_named(
+    mut chain: Vec<Finding>,
+    named: &[NamedMechanism],
+    catalogue: &Catalogue,
+) -> Vec<Finding> {
+    for name in named {
+        let id = Id::parse(name.id);
+        let facts = id.and_then(|id| catalogue.of(id)).map(Describe::facts);
+        let Some((facts, figure)) = facts.zip(name.parameters.first()) else {
+            continue;
+        };
+        let Some(word) = facts.finding else { continue };
+        let mut all = chain.iter();
+        let known = all.any(|own| own.channel == facts.channel && own.finding == word);
+        if !known && name.evidence.confidence >= TOLD_OF_CHANNEL {
+            let value = (figure.value, figure.std);
+            let own = Finding::of(facts.channel, word, value, &figure.unit);
+            chain.push(own.saying(name.statement.clone()));
+        }
+    }
+    chain
 }
 
 /// Names that the same argument without what is kept speaks against: a memory where it knows of none at all, or names one
@@ -187,6 +214,9 @@ fn refuted(named: &[NameOfForce], again: &Again, worse: bool) -> Vec<Id> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::audit::Word;
+    use crate::mechanism::Reported;
+    use crate::outcome::{Evidence, ReportedParameter};
 
     const fn name(id: Id, remembers: bool) -> NameOfForce {
         NameOfForce {
@@ -209,6 +239,38 @@ mod tests {
     const RELAXATION: NameOfForce = name(Id::RelaxationLength, true);
     const WEAR: NameOfForce = name(Id::WearDrift, false);
     const FADE: NameOfForce = name(Id::ThermalFade, false);
+
+    #[test]
+    fn what_a_sure_name_says_of_a_channel_is_told_of_the_chain_once() {
+        let catalogue = Catalogue::default();
+        let ripple = |confidence: f64| NamedMechanism {
+            id: Id::EncoderRipple.as_str(),
+            balance: Balance::Tyre.as_str(),
+            statement: "The wheel speed reading varies.".to_owned(),
+            equation: String::new(),
+            parameters: vec![ReportedParameter::new(
+                &Reported::new("amplitude", "1", 0.003),
+                2e-4,
+            )],
+            evidence: Evidence {
+                delta_bic: 900.0,
+                holdout_nll_gain_per_sample: 0.1,
+                confidence,
+            },
+            confusable_with: Vec::new(),
+            separating_test: String::new(),
+            effect_sigma: 1.0,
+        };
+        let told = |before: Vec<Finding>, confidence: f64| {
+            with_named(before, &[ripple(confidence)], &catalogue)
+        };
+        let one = told(Vec::new(), 0.95);
+        assert_eq!(one[0].finding, Word::Ripple);
+        assert_eq!(one[0].channel, "wheel_speed_rad_s");
+        assert_eq!((one[0].value, one[0].std), (0.003, 2e-4));
+        assert_eq!(told(one.clone(), 0.95), one);
+        assert!(told(Vec::new(), 0.6).is_empty());
+    }
 
     #[test]
     fn a_memory_has_to_come_out_again_and_to_predict_no_worse() {

@@ -3,6 +3,7 @@
 use super::guide::{Guide, Memory};
 use super::id::Id;
 use super::state::{Law, State};
+use crate::audit::Word;
 use crate::balance::Balance;
 use crate::context::Context;
 use crate::number::Number;
@@ -160,6 +161,8 @@ pub struct Facts {
     pub through_force: bool,
     /// Channel of a recording that shows it.
     pub channel: &'static str,
+    /// What that channel does, in the word of `chain`: a name that says it has its first figure told there, too.
+    pub finding: Option<Word>,
     /// The speed whose lateness it is: found by the timing of the channels, not among the other mechanisms.
     pub late: Option<Speed>,
     /// What the picture of its effect is drawn over, where wheel or vehicle lack it.
@@ -193,6 +196,7 @@ impl Facts {
             equation,
             through_force: balance == Balance::Tyre,
             channel: balance.channel(),
+            finding: None,
             late: None,
             drawn_over: Against::Time,
             amplitude: Some(0),

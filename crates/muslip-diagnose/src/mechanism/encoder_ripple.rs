@@ -19,6 +19,7 @@ impl Describe for EncoderRipple {
             through_force: false,
             fed_by_chain: true,
             channel: "wheel_speed_rad_s",
+            finding: Some(Word::Ripple),
             ..Facts::of(
                 Id::EncoderRipple,
                 Stage::Kinematics,

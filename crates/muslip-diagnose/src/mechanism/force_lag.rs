@@ -12,6 +12,7 @@ impl Describe for ForceLag {
         let equation = "time_constant * d(reading)/dt + reading = drag";
         Facts {
             filters: true,
+            finding: Some(Word::LowPassed),
             ..Facts::of(Id::ForceLag, Stage::Filter, equation)
         }
     }
