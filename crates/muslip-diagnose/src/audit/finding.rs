@@ -1,4 +1,4 @@
-//! What the audit says: one entry of `chain`.
+//! What is said of the measuring chain: one entry of `chain`.
 
 use serde::Serialize;
 

@@ -3,12 +3,12 @@
 use super::trial::{Claim, Trial};
 use crate::constants::{
     CLEARLY_PREDICTED, DEPENDENCE_WORTH, FEWEST_RUNS_AGREED, INDIFFERENT_NATS,
-    LARGE_GAIN_AT_SENSORS, LARGE_GAIN_OF_DEPENDENCE_AT_SENSORS, LARGE_GAIN_ON_UNSEEN, LEAST_EFFECT,
-    LEAST_GAIN, LEAST_GAIN_AT_SENSORS, LEAST_GAIN_OF_DEPENDENCE_AT_SENSORS, LEAST_PREDICTED,
-    LEAST_PREDICTED_BY_DEPENDENCE, LEAST_T, LEAST_T_AT_SENSORS, LEAST_T_AT_SENSORS_NOT_FED,
-    LEAST_T_NOT_FED, LEAST_T_OF_AGREED, LEAST_T_OF_DEPENDENCE, LEAST_T_OF_DEPENDENCE_AT_SENSORS,
-    LEAST_T_OF_LARGE, LEAST_T_OF_LIKELIER, LINED_UP_PREDICTED, LINED_UP_PREDICTED_BY_DEPENDENCE,
-    PREDICTED_APART,
+    LARGE_GAIN_AT_SENSORS, LARGE_GAIN_OF_DEPENDENCE_AT_SENSORS, LARGE_GAIN_ON_UNSEEN,
+    LARGE_TO_WORTH, LEAST_EFFECT, LEAST_GAIN, LEAST_GAIN_AT_SENSORS,
+    LEAST_GAIN_OF_DEPENDENCE_AT_SENSORS, LEAST_PREDICTED, LEAST_PREDICTED_BY_DEPENDENCE, LEAST_T,
+    LEAST_T_AT_SENSORS, LEAST_T_AT_SENSORS_NOT_FED, LEAST_T_NOT_FED, LEAST_T_OF_AGREED,
+    LEAST_T_OF_DEPENDENCE, LEAST_T_OF_DEPENDENCE_AT_SENSORS, LEAST_T_OF_LARGE, LEAST_T_OF_LIKELIER,
+    LINED_UP_PREDICTED, LINED_UP_PREDICTED_BY_DEPENDENCE, PREDICTED_APART,
 };
 
 impl Trial {
@@ -38,7 +38,7 @@ fn worth(trial: &Trial) -> f64 {
 }
 
 /// Whether a trial could be named, were it seen: large enough, itself, neither a memory of the chain's nor what one leaves,
-/// and better at predicting.
+/// and better at predicting, or hardly worse where it gains much.
 fn could_be_named(trial: &Trial) -> bool {
     trial.size > worth(trial) && is_plausible(trial)
 }
@@ -59,10 +59,11 @@ fn least_predicted(trial: &Trial) -> f64 {
     }
 }
 
-/// Whether unseen runs together gain more by a name than a measuring chain leaves.
+/// Whether unseen runs together gain more by a name that works through the force than a measuring chain leaves.
 fn gains_beyond_chain(trial: &Trial) -> bool {
     let of_runs = trial.unseen.0 * trial.runs as f64;
-    trial.mechanism().is_some() && of_runs > LARGE_GAIN_ON_UNSEEN
+    let least = LARGE_GAIN_ON_UNSEEN.max(LARGE_TO_WORTH * worth(trial));
+    trial.mechanism().is_some() && trial.predicts.is_finite() && of_runs > least
 }
 
 /// Gain from which a name that unseen runs bear out is seen, nats.
@@ -173,7 +174,7 @@ pub fn left_open(trial: &Trial) -> bool {
     trial.mechanism().is_none() && !stands(trial) && shown
 }
 
-/// Whether unseen runs gain, and alike.
+/// Whether unseen runs gain, and alike, or much.
 fn seen_on_unseen_runs(trial: &Trial) -> bool {
     let (mean, t) = trial.unseen;
     match trial.claim {
@@ -185,7 +186,8 @@ fn seen_on_unseen_runs(trial: &Trial) -> bool {
             } else {
                 LEAST_T
             };
-            mean > 0.0 && (t >= least || trial.unanimous[0] && (clearly || large))
+            let several = trial.runs >= FEWEST_RUNS_AGREED;
+            mean > 0.0 && (t >= least || trial.unanimous[0] && (clearly || large && several))
         }
         // What says nothing of what it is has to be seen at the sensors' noise as well: fitted noise may have left it.
         Claim::Dependence(_) => {
@@ -217,7 +219,7 @@ mod tests {
     }
 
     #[test]
-    fn a_gain_that_no_chain_leaves_needs_no_more_even_runs_than_what_chains_do_not_feed() {
+    fn a_gain_that_no_chain_leaves_needs_neither_even_runs_nor_a_better_prediction() {
         let data = stop(Noise::TYPICAL, 4);
         let base = toy::settled(&data);
         // So many nats on each of six unseen runs.
@@ -243,6 +245,21 @@ mod tests {
             ..fed(nats, 1.2)
         };
         assert!(stands(&few(60.0)) && !stands(&few(40.0)));
+        let on_three = Trial {
+            runs: 3,
+            ..few(120.0)
+        };
+        assert!(!stands(&on_three));
+        // An inertia predicts no drag, and of a long campaign any effect that is worth a name gains as much.
+        let of_wheel = Trial {
+            predicts: f64::INFINITY,
+            ..few(60.0)
+        };
+        let long = Trial {
+            readings: 20_000,
+            ..few(60.0)
+        };
+        assert!(!stands(&of_wheel) && !stands(&long));
     }
 
     #[test]

@@ -5,8 +5,8 @@ use std::collections::BTreeMap;
 use super::answer::Answer;
 use crate::audit::Timing;
 use crate::constants::{
-    AUDITED, FEW_RUNS_SURE, FORM_OF_DELAY_S, HARDLY_LESS, LEAST_CONFIDENCE, LEAST_DELAY_S,
-    PREDICTED_APART, RARE_SHARE, SURE_DELAY, TIED, VAGUE_DELAY_S,
+    AUDITED, DOUBTED, FEW_RUNS_SURE, FORM_OF_DELAY_S, HARDLY_LESS, LEAST_CONFIDENCE, LEAST_DELAY_S,
+    LEAST_PREDICTED, PREDICTED_APART, RARE_SHARE, SURE_DELAY, TIED, VAGUE_DELAY_S,
 };
 use crate::decide::{Claim, Trial, rivals, softness};
 use crate::figures::{figures, with_form};
@@ -91,9 +91,15 @@ impl Answer<'_> {
             shares(trial, round),
             mechanism.rare_double(&self.data.series),
         );
+        let most = if trial.predicts > LEAST_PREDICTED {
+            1.0
+        } else {
+            DOUBTED
+        };
+        let sure = confidence(share, trial.steadiness(), self.data.series.len());
         let sureness = Sureness {
             share,
-            confidence: confidence(share, trial.steadiness(), self.data.series.len()),
+            confidence: sure.min(most),
             others,
         };
         Some((trial, sureness))

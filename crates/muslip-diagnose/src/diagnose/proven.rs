@@ -127,7 +127,7 @@ impl<'a> Proven<'a> {
         }
         // What is no likelier than not, or not borne out by unseen runs, is not the strongest, whatever it gained.
         mechanisms.sort_by_key(|named| named.evidence.confidence <= DOUBTED);
-        let chain = with_named(answer.audit.chain(), &mechanisms, &answer.data.catalogue);
+        let chain = with_named(answer.audit, &mechanisms, &answer.data.catalogue);
         let unexplained = answer.unexplained();
         let verdict = match (mechanisms.is_empty(), unexplained.is_empty()) {
             (true, true) => Verdict::Consistent,
@@ -166,13 +166,11 @@ impl<'a> Proven<'a> {
     }
 }
 
-/// What the audit says of the channels, and what names do that say what a channel does: an encoder's ripple, a filter of the
-/// drag. Without the tyre law, which these need to be seen by, the audit may not find them.
-fn with_named(
-    mut chain: Vec<Finding>,
-    named: &[NamedMechanism],
-    catalogue: &Catalogue,
-) -> Vec<Finding> {
+/// What the audit says of the channels, and what sure names do that say what a channel does: an encoder's ripple, a filter of
+/// the drag. Without the tyre law, which these need to be seen by, the audit may not find them. (A delay of the drag is told by
+/// how early the others are.)
+fn with_named(audit: &Audit, named: &[NamedMechanism], catalogue: &Catalogue) -> Vec<Finding> {
+    let mut chain = audit.chain();
     for name in named {
         let id = Id::parse(name.id);
         let facts = id.and_then(|id| catalogue.of(id)).map(Describe::facts);
@@ -180,7 +178,8 @@ fn with_named(
             continue;
         };
         let Some(word) = facts.finding else { continue };
-        let mut all = chain.iter();
+        // A filter by which a recording was thinned is not the channel's.
+        let mut all = audit.findings.iter();
         let known = all.any(|own| own.channel == facts.channel && own.finding == word);
         if !known && name.evidence.confidence >= TOLD_OF_CHANNEL {
             let value = (figure.value, figure.std);
@@ -261,8 +260,12 @@ mod tests {
             separating_test: String::new(),
             effect_sigma: 1.0,
         };
-        let told = |before: Vec<Finding>, confidence: f64| {
-            with_named(before, &[ripple(confidence)], &catalogue)
+        let told = |findings: Vec<Finding>, confidence: f64| {
+            let audit = Audit {
+                findings,
+                ..Audit::default()
+            };
+            with_named(&audit, &[ripple(confidence)], &catalogue)
         };
         let one = told(Vec::new(), 0.95);
         assert_eq!(one[0].finding, Word::Ripple);

@@ -161,7 +161,7 @@ pub struct Facts {
     pub through_force: bool,
     /// Channel of a recording that shows it.
     pub channel: &'static str,
-    /// What that channel does, in the word of `chain`: a name that says it has its first figure told there, too.
+    /// What that channel does, in the word of `chain`: a name that is sure of it has its first figure told there, too.
     pub finding: Option<Word>,
     /// The speed whose lateness it is: found by the timing of the channels, not among the other mechanisms.
     pub late: Option<Speed>,

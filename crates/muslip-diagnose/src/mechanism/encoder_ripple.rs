@@ -2,6 +2,7 @@
 
 use super::once_a_turn::{Form, radius_reads_as_ripple};
 use super::prelude::*;
+use crate::audit::Word;
 
 /// Largest amplitude of an order, as a share of the wheel speed.
 const LIMIT: f64 = 0.08;

@@ -3,6 +3,7 @@
 use super::filters::first_order;
 use super::late;
 use super::prelude::*;
+use crate::audit::Word;
 
 /// The drag channel passes a first-order low-pass filter.
 pub struct ForceLag;

@@ -7,7 +7,6 @@ pub use super::describe::{
 pub use super::guide::{Alias, Compensation, Example, Guide, Kind, Memory, Sign, runs};
 pub use super::id::Id;
 pub use super::state::State;
-pub use crate::audit::Word;
 pub use crate::balance::Balance;
 pub use crate::context::Context;
 pub use crate::number::Number;
