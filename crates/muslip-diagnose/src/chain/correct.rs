@@ -72,16 +72,20 @@ impl Lateness {
         self.shifted(&without_holds(run))
     }
 
-    /// The run with every channel at the drag channel's time. Where nothing was recorded yet, or any more, the nearest
-    /// reading stands: see [`Self::known`].
+    /// The run with every channel at the drag channel's time. Where nothing was recorded yet, or any more, a speed goes on
+    /// along a straight line, for what holds it there would be a slip, and of the brake the nearest reading stands: see
+    /// [`Self::known`].
     #[must_use]
     pub fn shifted(&self, run: &Run) -> Run {
         let time = &run.time_s;
         let wheel = &run.wheel_speed_rad_s;
-        let brake = |x: &Vec<f64>| later(time, x, |_| self.brake);
+        let brake = |x: &Vec<f64>| later(time, x, |_| self.brake, |_| None);
+        let speed = |x: &[f64], by: &dyn Fn(usize) -> f64| {
+            later(time, x, by, |wanted| straight_on(time, x, wanted))
+        };
         Run {
-            wheel_speed_rad_s: later(time, wheel, |k| self.of_reading(wheel[k])),
-            vehicle_speed_m_s: later(time, &run.vehicle_speed_m_s, |_| self.vehicle),
+            wheel_speed_rad_s: speed(wheel, &|k| self.of_reading(wheel[k])),
+            vehicle_speed_m_s: speed(&run.vehicle_speed_m_s, &|_| self.vehicle),
             brake_torque_nm: run.brake_torque_nm.as_ref().map(brake),
             brake_pressure_pa: run.brake_pressure_pa.as_ref().map(brake),
             ..run.clone()
@@ -137,8 +141,45 @@ fn bracket(time: &[f64], wanted: f64, at: &mut usize) {
     }
 }
 
-/// A channel read later by so many seconds at every sample: a straight line between the readings about that time.
-fn later(time: &[f64], x: &[f64], by: impl Fn(usize) -> f64) -> Vec<f64> {
+/// Shortest stretch at an end of a run, in s, along which a speed is drawn on beyond it: several readings of any sensor, and
+/// short beside a stop.
+const SHORTEST_STRETCH_S: f64 = 0.1;
+
+/// A speed at a time beyond an end of its recording: on the straight line through its last readings, or its first, over twice
+/// as long a stretch as it lies beyond. It comes to rest, and does not turn round.
+fn straight_on(time: &[f64], x: &[f64], wanted: f64) -> Option<f64> {
+    let (first, last) = (*time.first()?, *time.last()?);
+    let from = wanted.clamp(first, last);
+    let stretch = (2.0 * (wanted - from).abs()).max(SHORTEST_STRETCH_S);
+    let begin = time.partition_point(|t| *t < from - stretch);
+    let end = time.partition_point(|t| *t <= from + stretch);
+    let near = time[begin..end].iter().zip(&x[begin..end]);
+    let near = near.filter(|(_, x)| x.is_finite());
+    let (mut n, mut sums) = (0.0, [0.0; 4]);
+    let mut least = f64::INFINITY;
+    for (t, x) in near {
+        let t = t - from;
+        n += 1.0;
+        for (sum, own) in sums.iter_mut().zip([t, *x, t * t, t * x]) {
+            *sum += own;
+        }
+        least = least.min(*x);
+    }
+    let [t, x, tt, tx] = sums;
+    let slope = (n * tx - t * x) / (n * tt - t * t);
+    let value = (x - slope * t) / n + slope * (wanted - from);
+    let value = if least >= 0.0 { value.max(0.0) } else { value };
+    value.is_finite().then_some(value)
+}
+
+/// A channel read later by so many seconds at every sample: a straight line between the readings about that time, and what is
+/// `beyond` an end of the recording, where that is known, else the nearest reading.
+fn later(
+    time: &[f64],
+    x: &[f64],
+    by: impl Fn(usize) -> f64,
+    beyond: impl Fn(f64) -> Option<f64>,
+) -> Vec<f64> {
     let n = x.len();
     if n < 2 {
         return x.to_vec();
@@ -151,6 +192,14 @@ fn later(time: &[f64], x: &[f64], by: impl Fn(usize) -> f64) -> Vec<f64> {
                 return x[k];
             }
             let wanted = time[k] + shift;
+            let told = if wanted < time[0] || wanted > time[n - 1] {
+                beyond(wanted)
+            } else {
+                None
+            };
+            if let Some(told) = told {
+                return told;
+            }
             bracket(time, wanted, &mut at);
             let share = ((wanted - time[at]) / (time[at + 1] - time[at])).clamp(0.0, 1.0);
             x[at] * (1.0 - share) + x[at + 1] * share
@@ -177,10 +226,42 @@ mod tests {
             ..Lateness::default()
         };
         let corrected = late.corrected(&run);
-        for (k, t) in time.iter().enumerate().take(180).skip(10) {
+        // What it had not told when the recording stopped, too: on a straight line it goes on.
+        for (k, t) in time.iter().enumerate().skip(10) {
             assert!((corrected.wheel_speed_rad_s[k] - 50.0 - 3.0 * t).abs() < 1e-9);
             assert!((corrected.vehicle_speed_m_s[k] - 20.0 + 2.0 * t).abs() < 1e-9);
         }
+    }
+
+    #[test]
+    fn a_speed_goes_on_beyond_its_recording_until_it_comes_to_rest_and_a_brake_does_not() {
+        let time: Vec<f64> = (0..200).map(|k| 0.01 * f64::from(k)).collect();
+        let run = Run {
+            // 0.1 m/s are left where the recording ends.
+            vehicle_speed_m_s: time.iter().map(|t| 2.09 - t).collect(),
+            wheel_speed_rad_s: vec![5.0; 200],
+            brake_torque_nm: Some(time.iter().map(|t| 100.0 * t).collect()),
+            time_s: time.clone(),
+            ..Run::default()
+        };
+        let late = Lateness {
+            vehicle: 0.15,
+            brake: 0.15,
+            wheel: 0.01,
+            ..Lateness::default()
+        };
+        let corrected = late.corrected(&run);
+        let speed = &corrected.vehicle_speed_m_s;
+        assert!((speed[190] - 0.04).abs() < 1e-9, "{}", speed[190]);
+        assert_eq!(speed[199], 0.0);
+        assert!((corrected.brake_torque_nm.unwrap()[199] - 199.0).abs() < 1e-9);
+        // A channel that is early has a beginning that nothing told.
+        let early = Lateness {
+            vehicle: -0.05,
+            ..Lateness::default()
+        };
+        let begins = early.corrected(&run).vehicle_speed_m_s[0];
+        assert!((begins - 2.14).abs() < 1e-9, "{begins}");
     }
 
     #[test]
