@@ -144,12 +144,12 @@ fn bracket(time: &[f64], wanted: f64, at: &mut usize) {
     }
 }
 
-/// Shortest stretch at an end of a run, in s, along which a vehicle's speed is drawn on beyond it: several readings of any sensor, and
-/// short beside a stop.
+/// Shortest stretch at an end of a run, in s, along which a vehicle's speed is drawn on beyond it: several readings of any
+/// sensor, and short beside a stop.
 const SHORTEST_STRETCH_S: f64 = 0.1;
 
-/// A vehicle's speed at a time beyond an end of its recording: on the straight line through its last readings, or its first, over twice
-/// as long a stretch as it lies beyond. It comes to rest, and does not turn round.
+/// A vehicle's speed at a time beyond an end of its recording: on the straight line through its last readings, or its first,
+/// over twice as long a stretch as it lies beyond. It comes to rest, and does not turn round.
 fn straight_on(time: &[f64], x: &[f64], wanted: f64) -> Option<f64> {
     let (first, last) = (*time.first()?, *time.last()?);
     let from = wanted.clamp(first, last);
@@ -195,12 +195,8 @@ fn later(
                 return x[k];
             }
             let wanted = time[k] + shift;
-            let told = if wanted < time[0] || wanted > time[n - 1] {
-                beyond(wanted)
-            } else {
-                None
-            };
-            if let Some(told) = told {
+            let outside = wanted < time[0] || wanted > time[n - 1];
+            if let Some(told) = outside.then(|| beyond(wanted)).flatten() {
                 return told;
             }
             bracket(time, wanted, &mut at);

@@ -1,7 +1,6 @@
 //! Whose memory it is: a tyre's goes by how far it has rolled, a chain's by the clock.
 
-use super::next::much_more;
-use super::rank::softness;
+use super::rank::{much_more, softness};
 use super::trial::Trial;
 use crate::data::Data;
 use crate::mechanism::{Balance, Id, Kind, Memory};

@@ -1,9 +1,9 @@
 //! Which trial of a round is taken up.
 
-use super::rank::softness;
+use super::rank::{much_more, softness};
 use super::stands::{could_stand, stands};
 use super::trial::Trial;
-use crate::constants::{DEPENDENCE_NATS, DEPENDENCE_SHARE, FORM_LEFT, STILL_SPEAKS};
+use crate::constants::{FORM_LEFT, STILL_SPEAKS};
 use crate::data::Data;
 use crate::mechanism::{Balance, Id};
 
@@ -21,6 +21,7 @@ pub struct TakenUp {
 }
 
 impl TakenUp {
+    /// Takes it up.
     pub fn add(&mut self, trial: &Trial) {
         self.at_sensors += trial.at_sensors.0.max(0.0);
         let name = trial.mechanism().map(|(id, _)| (id, trial.weight()));
@@ -79,11 +80,6 @@ pub fn next<'a>(data: &Data, trials: &'a [Trial], before: &TakenUp) -> Option<&'
     };
     let mut free = standing().filter(|t| t.mechanism().is_none());
     Some(free.find(instead).unwrap_or(named))
-}
-
-/// Whether one gain is so much more than another that the other's form does not make up for it.
-pub fn much_more(own: f64, than: f64) -> bool {
-    own > DEPENDENCE_SHARE * than + DEPENDENCE_NATS
 }
 
 /// Balances that a name touches, of those that the recordings form.

@@ -2,7 +2,10 @@
 
 use super::stands::stands;
 use super::trial::{Claim, Trial};
-use crate::constants::{ALIKE_NATS, ALIKE_SHARE, PREDICTED_APART, SOFT_SHARE, SOFTNESS};
+use crate::constants::{
+    ALIKE_NATS, ALIKE_SHARE, DEPENDENCE_NATS, DEPENDENCE_SHARE, PREDICTED_APART, SOFT_SHARE,
+    SOFTNESS,
+};
 use crate::data::Data;
 
 /// Best first; of those that gain alike, the one first that claims the least.
@@ -43,6 +46,11 @@ fn commoner_first<T>(best_first: &mut [T], gain: impl Fn(&T) -> f64, rare: impl 
 /// Nats by which two names may differ and be hardly told apart: no model of this kind is exactly true.
 pub fn softness(gain: f64) -> f64 {
     SOFTNESS + SOFT_SHARE * gain
+}
+
+/// Whether one gain is so much more than another that the other's form does not make up for it.
+pub fn much_more(own: f64, than: f64) -> bool {
+    own > DEPENDENCE_SHARE * than + DEPENDENCE_NATS
 }
 
 /// Of those that gain much the same and remember, the one first that predicts the drag clearly better: the chain's own

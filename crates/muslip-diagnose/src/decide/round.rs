@@ -17,9 +17,13 @@ use crate::mechanism::{Id, Kind};
 
 /// What every round is held with.
 pub struct Question<'a> {
+    /// The recordings at one time.
     pub data: &'a Data,
+    /// Free dependences.
     pub free: Vec<Dependence>,
+    /// Mechanisms that are not asked for.
     pub excluded: &'a [Id],
+    /// What the chain's own timing does not tell.
     pub untold: Untold,
 }
 

@@ -6,7 +6,7 @@ use super::model_out::Predicts;
 use crate::audit::{Audit, Finding};
 use crate::constants::{BEYOND_REFUTATION, DOUBTED, TOLD_OF_CHANNEL};
 use crate::data::Catalogue;
-use crate::mechanism::{Balance, Describe, Id};
+use crate::mechanism::{Balance, Describe, Facts, Id};
 use crate::outcome::{Diagnosis, Fit, NamedMechanism, Verdict};
 use crate::proof::Predicted;
 use crate::repaired::{Predicting, Repaired};
@@ -100,9 +100,8 @@ impl<'a> Proven<'a> {
     /// What works through the force is not sure where the force is not predicted any better.
     fn doubt(&self, mechanisms: &mut [NamedMechanism]) {
         for named in mechanisms.iter_mut() {
-            let id = Id::parse(named.id);
-            let mechanism = id.and_then(|id| self.answer.data.catalogue.of(id));
-            if mechanism.is_some_and(|m| m.facts().through_force) {
+            let facts = facts_of(named, &self.answer.data.catalogue);
+            if facts.is_some_and(|facts| facts.through_force) {
                 named.evidence.confidence = named.evidence.confidence.min(DOUBTED);
             }
         }
@@ -166,14 +165,19 @@ impl<'a> Proven<'a> {
     }
 }
 
+/// What a name's mechanism says of itself.
+fn facts_of(named: &NamedMechanism, catalogue: &Catalogue) -> Option<Facts> {
+    let id = Id::parse(named.id)?;
+    catalogue.of(id).map(Describe::facts)
+}
+
 /// What the audit says of the channels, and what sure names do that say what a channel does: an encoder's ripple, a filter of
 /// the drag. Without the tyre law, which these need to be seen by, the audit may not find them. (A delay of the drag is told by
 /// how early the others are.)
 fn with_named(audit: &Audit, named: &[NamedMechanism], catalogue: &Catalogue) -> Vec<Finding> {
     let mut chain = audit.chain();
     for name in named {
-        let id = Id::parse(name.id);
-        let facts = id.and_then(|id| catalogue.of(id)).map(Describe::facts);
+        let facts = facts_of(name, catalogue);
         let Some((facts, figure)) = facts.zip(name.parameters.first()) else {
             continue;
         };
