@@ -109,6 +109,9 @@ pub struct Data {
     pub faults: Vec<DataFault>,
     /// Samples that were averaged into one beforehand, at least one.
     pub averaged: usize,
+    /// Share of the tyre's readings of all recordings that the argument is made with: less than one where it is made without
+    /// what is kept for the proof.
+    pub share: f64,
     /// Blocks that the balances are weighed on, by run.
     pub blocks: Vec<[Blocks; 3]>,
     /// Standard deviations in s to which the channels' timing is known.
@@ -292,6 +295,7 @@ impl Data {
             extra_names: Vec::new(),
             faults: Vec::new(),
             averaged: 1,
+            share: 1.0,
             blocks: Vec::new(),
             timing_std: TimingStd::default(),
             vehicle_late: 0.0,

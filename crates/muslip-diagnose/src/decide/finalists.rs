@@ -385,13 +385,10 @@ impl<'a> Screen<'a> {
         self.judged(&self.mechanisms(passed))
     }
 
-    /// The same of these mechanisms, whatever the screen has them gain: each form from its best start.
-    pub fn trials_of(&self, ids: &[Id]) -> Vec<Trial> {
+    /// The same of these forms, by their entries, whatever the screen has them gain: each from its best start.
+    pub fn trials_of(&self, entries: &[usize]) -> Vec<Trial> {
         let mut finalists: Vec<Finalist> = Vec::new();
-        for (entry, mechanism) in self.data.catalogue.entries().iter().enumerate() {
-            if !ids.contains(&mechanism.id()) {
-                continue;
-            }
+        for &entry in entries {
             let all = self.levels.iter().flat_map(|(all, _)| all);
             let best = best_start(self.data, &self.candidates, all, Some(entry));
             finalists.extend(best.map(|score| Finalist {
@@ -452,7 +449,7 @@ impl<'a> Screen<'a> {
 mod tests {
     use super::*;
     use crate::chain::untold::Untold;
-    use crate::innovations::toy::{Noise, settled, stop};
+    use crate::innovations::toy::{Noise, entry_of, settled, stop};
 
     #[test]
     fn what_is_asked_for_is_tried_whatever_the_screen_has_it_gain() {
@@ -473,7 +470,8 @@ mod tests {
             all.map(|own| own.0).collect()
         };
         assert!(!ids(&screen.trials()).contains(&Id::ForceLag));
-        let asked = screen.trials_of(&[Id::ForceLag, Id::ForceDelay]);
+        let entries = [Id::ForceLag, Id::ForceDelay].map(|id| entry_of(&data, id));
+        let asked = screen.trials_of(&entries);
         let mut found = ids(&asked);
         found.sort_unstable();
         assert_eq!(found, [Id::ForceDelay, Id::ForceLag]);

@@ -18,9 +18,10 @@ pub use left::Left;
 use next::{TakenUp, next};
 pub use rank::softness;
 use refuted::refuted;
+pub use round::Asked;
 use round::Question;
 use settled::{again, at_noise_of, settled, under_own_noise};
-pub use stands::{could_stand, rivals};
+pub use stands::{could_stand, gains_beyond_chain, rivals};
 use stands::{needed, stands};
 use trial::Before;
 pub use trial::{Claim, Trial};
@@ -31,7 +32,6 @@ use crate::data::Data;
 use crate::innovations::dependence;
 use crate::innovations::hypothesis::{Guess, Judged, judge};
 use crate::looked::Seen;
-use crate::mechanism::Id;
 
 /// What was decided.
 pub struct Decision {
@@ -110,11 +110,11 @@ impl Decision {
 
 /// Decides what is named beside the base model; `untold` is what the chain's own timing does not tell.
 #[must_use]
-pub fn decide(data: &Data, base: Judged, excluded: &[Id], untold: Untold) -> Decision {
+pub fn decide(data: &Data, base: Judged, asked: &Asked, untold: Untold) -> Decision {
     let question = Question {
         data,
         free: dependence::all(data),
-        excluded,
+        asked,
         untold,
     };
     // What it was judged by may know less than the data do now.

@@ -15,14 +15,23 @@ use crate::innovations::hypothesis::{Judged, judge_added};
 use crate::looked::Seen;
 use crate::mechanism::{Id, Kind};
 
+/// What is asked for: what not, and what in any case.
+#[derive(Default)]
+pub struct Asked {
+    /// Mechanisms that are not asked for.
+    pub excluded: Vec<Id>,
+    /// Entries of what the same question came to with more recordings, which is judged whatever the screen has it gain.
+    pub named: Vec<usize>,
+}
+
 /// What every round is held with.
 pub struct Question<'a> {
     /// The recordings at one time.
     pub data: &'a Data,
     /// Free dependences.
     pub free: Vec<Dependence>,
-    /// Mechanisms that are not asked for.
-    pub excluded: &'a [Id],
+    /// What is asked for.
+    pub asked: &'a Asked,
     /// What the chain's own timing does not tell.
     pub untold: Untold,
 }
@@ -32,9 +41,10 @@ impl Question<'_> {
     pub fn round(&self, so_far: &Judged, taken_up: &TakenUp) -> (Vec<Trial>, Vec<Seen>) {
         let data = self.data;
         let before = Before::new(data, so_far, self.untold, taken_up.at_sensors);
-        let screen = Screen::new(data, before, &self.free, self.excluded);
+        let screen = Screen::new(data, before, &self.free, &self.asked.excluded);
         let mut trials = screen.trials();
         self.tell_from_clocks(&screen, &mut trials);
+        self.judge_named(&screen, &mut trials);
         refute(data, &mut trials, &taken_up.refuted);
         self.hold_beside_chain(&[], &mut trials, taken_up);
         // What only the chain remembers has taken the place of other names.
@@ -54,6 +64,24 @@ impl Question<'_> {
         (trials, screen.seen())
     }
 
+    /// Judges what was named before where it is not among the trials: how a form scores where it starts says little of what it
+    /// gains at its best.
+    fn judge_named(&self, screen: &Screen<'_>, trials: &mut Vec<Trial>) {
+        let is_tried = |entry: usize| {
+            let own = |t: &Trial| t.mechanism().is_some_and(|own| own.1 == entry);
+            trials.iter().any(own)
+        };
+        let named = self.asked.named.iter().copied();
+        let untried: Vec<usize> = named.filter(|entry| !is_tried(*entry)).collect();
+        if untried.is_empty() {
+            return;
+        }
+        let mut judged = screen.trials_of(&untried);
+        self.tell_from_clocks(screen, &mut judged);
+        trials.extend(judged);
+        rank(self.data, trials);
+    }
+
     /// The same as [`tell_from_clocks`] where no wheel is late by turn, for that goes by how far it has rolled as well. Where
     /// no memory that goes by the clock gains enough to be among the trials, all are tried beside them.
     fn tell_from_clocks(&self, screen: &Screen<'_>, trials: &mut [Trial]) {
@@ -69,7 +97,10 @@ impl Question<'_> {
         let mut clocks: Vec<[f64; 2]> = trials.iter().filter(by_clock).map(gains_of).collect();
         if clocks.is_empty() {
             let all = clocks_of(data);
-            let tried = screen.trials_of(&all);
+            let entries = data.catalogue.entries().iter().enumerate();
+            let of_clocks = entries.filter(|(_, own)| all.contains(&own.id()));
+            let of_clocks: Vec<usize> = of_clocks.map(|(entry, _)| entry).collect();
+            let tried = screen.trials_of(&of_clocks);
             let is_tried = |id: &Id| {
                 tried
                     .iter()
@@ -140,4 +171,40 @@ fn stands_beside(data: &Data, trial: &Trial, before: &Before<'_>) -> bool {
         let again = before.tried(trial.claim.clone(), both, trial.size);
         stands(&again) || !stands(trial) && could_stand(&again)
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::innovations::toy::{Noise, entry_of, settled as toy_settled, stop};
+
+    #[test]
+    fn what_was_named_before_is_judged_whatever_the_screen_has_it_gain() {
+        let data = stop(Noise::TYPICAL, 4);
+        let base = toy_settled(&data);
+        let lag = entry_of(&data, Id::ForceLag);
+        let is_judged = |asked: &Asked| {
+            let question = Question {
+                data: &data,
+                free: Vec::new(),
+                asked,
+                untold: Untold::default(),
+            };
+            let (trials, _) = question.round(&base, &TakenUp::default());
+            let mut own = trials.iter().filter_map(Trial::mechanism);
+            own.any(|own| own.1 == lag)
+        };
+        // Nothing is missing, so a lag is not among the best.
+        assert!(!is_judged(&Asked::default()));
+        let named = Asked {
+            named: vec![lag],
+            ..Asked::default()
+        };
+        assert!(is_judged(&named));
+        let excluded = Asked {
+            excluded: vec![Id::ForceLag],
+            ..named
+        };
+        assert!(!is_judged(&excluded));
+    }
 }

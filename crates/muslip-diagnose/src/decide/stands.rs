@@ -59,10 +59,13 @@ fn least_predicted(trial: &Trial) -> f64 {
     }
 }
 
-/// Whether unseen runs together gain more by a name that works through the force than a measuring chain leaves.
-fn gains_beyond_chain(trial: &Trial) -> bool {
+/// Whether unseen runs together gain more by a name that works through the force than a measuring chain leaves: of fewer
+/// recordings as much less.
+#[must_use]
+pub fn gains_beyond_chain(trial: &Trial) -> bool {
     let of_runs = trial.unseen.0 * trial.runs as f64;
-    let least = LARGE_GAIN_ON_UNSEEN.max(LARGE_TO_WORTH * worth(trial));
+    let of_chain = LARGE_GAIN_ON_UNSEEN * trial.share;
+    let least = of_chain.max(LARGE_TO_WORTH * worth(trial));
     trial.mechanism().is_some() && trial.predicts.is_finite() && of_runs > least
 }
 
@@ -231,6 +234,12 @@ mod tests {
         assert!(stands(&fed(60.0, 1.6)));
         assert!(!stands(&fed(60.0, 1.4)) && !stands(&fed(40.0, 1.6)));
         assert!(stands(&fed(40.0, 2.1)));
+        // Without what is kept for the proof there is less to gain.
+        let without_kept = Trial {
+            share: 0.75,
+            ..fed(40.0, 1.6)
+        };
+        assert!(stands(&without_kept));
         // Nor a better prediction: the noise of the slip is worth more behind a mode. Clearly worse is another matter.
         let predicting = |nats: f64, predicts: f64| Trial {
             predicts,

@@ -14,6 +14,7 @@ pub fn of_name(data: &Data, base: &Judged, id: Id, nats: f64, t: f64) -> Trial {
         price: 0.0,
         unseen: (nats, t),
         runs: 6,
+        share: 1.0,
         at_sensors: (nats, t),
         first: false,
         own: true,

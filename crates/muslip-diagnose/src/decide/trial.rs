@@ -69,6 +69,8 @@ pub struct Trial {
     pub unseen: (f64, f64),
     /// On how many unseen runs.
     pub runs: usize,
+    /// [`Data::share`].
+    pub share: f64,
     /// Gain on all unseen runs in nats if the noise were no larger than the sensors make plausible, and the t of the
     /// runs' gains under the root, signs kept: they are as uneven as the runs.
     pub at_sensors: (f64, f64),
@@ -249,6 +251,7 @@ impl<'a> Before<'a> {
             price,
             unseen: mean_and_t(&own_gains),
             runs: own_gains.len(),
+            share: data.share,
             first: !self.is_named_before(&claim, fed_by_chain) || at_sensors.0 > self.taken_up,
             at_sensors,
             own,

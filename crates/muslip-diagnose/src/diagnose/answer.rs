@@ -7,11 +7,13 @@ use crate::campaign::{Rig, Run};
 use crate::chain::recorded::Recorded;
 use crate::chain::timing::Timing;
 use crate::data::Data;
-use crate::decide::{Decision, Trial, could_stand, decide};
+use crate::decide::{Asked, Decision, Trial, could_stand, decide, gains_beyond_chain};
 use crate::innovations::hypothesis::{Judged, whole_over_slow};
 use crate::innovations::noise::BalanceParts;
 use crate::mechanism::{Balance, Context, Id};
+use crate::model::Term;
 use crate::number::finite_or_zero;
+use crate::series::Series;
 use crate::split::Split;
 
 /// What was given, as it was recorded.
@@ -29,6 +31,8 @@ pub(super) struct NameOfForce {
     pub(super) id: Id,
     /// Whether it is a memory.
     pub(super) remembers: bool,
+    /// Whether it gains more than a measuring chain leaves.
+    pub(super) beyond_chain: bool,
     /// Its confidence.
     pub(super) confidence: f64,
     /// What its round holds for hardly less likely.
@@ -53,7 +57,7 @@ pub(super) struct Answer<'a> {
 
 impl<'a> Answer<'a> {
     /// The argument with none of the names that are not asked for; `None` where nothing usable is left. It keeps timing
-    /// and windows of an `other` that was held before.
+    /// and windows of an `other` that was held before, and asks for its names.
     pub(super) fn of(
         given: &'a Given<'a>,
         kept: &Split,
@@ -65,6 +69,9 @@ impl<'a> Answer<'a> {
         let (mut data, timing, base) = recorded.timed(other.map(|other| &other.timing))?;
         data.tell_law_error(&base.parts);
         data.scale_slow_wheel(whole_over_slow(&data, &base));
+        data.share = other.map_or(1.0, |other| {
+            tyre_readings(&data) / tyre_readings(&other.data)
+        });
         let reach_factor = other.map_or_else(
             || recorded.best_reach(&timing, data.context.reach_factor),
             |other| other.to_predict.context.reach_factor,
@@ -78,7 +85,11 @@ impl<'a> Answer<'a> {
         // Delays of the speeds are the chain's: they are named by what the timing shows.
         let mut excluded = data.catalogue.delays();
         excluded.extend_from_slice(&not_asked);
-        let decision = decide(&data, base, &excluded, timing.untold());
+        let asked = Asked {
+            excluded,
+            named: other.map_or_else(Vec::new, Self::entries),
+        };
+        let decision = decide(&data, base, &asked, timing.untold());
         let mut answer = Self {
             given,
             kept: kept.clone(),
@@ -109,25 +120,37 @@ impl<'a> Answer<'a> {
         self
     }
 
+    /// Entries of its names.
+    fn entries(&self) -> Vec<usize> {
+        let terms = self.decision.chosen.model.terms.iter();
+        terms.map(|term| term.entry).collect()
+    }
+
     /// Its names that work through the force.
     pub(super) fn names_of_force(&self) -> Vec<NameOfForce> {
-        let Data {
-            catalogue, context, ..
-        } = &self.data;
+        let catalogue = &self.data.catalogue;
         let terms = self.decision.chosen.model.terms.iter();
         terms
             .map(|term| (term, catalogue.get(term.entry)))
             .filter(|(_, mechanism)| mechanism.facts().through_force)
             .map(|(term, mechanism)| {
-                let sure = self.sureness(term.entry).map(|own| own.1);
+                let (taken_up, sure) = self.sureness(term.entry).unzip();
                 NameOfForce {
                     id: mechanism.id(),
-                    remembers: mechanism.memory_s(&term.parameters, context).is_some(),
+                    remembers: self.remembers_force(term),
+                    beyond_chain: taken_up.is_some_and(gains_beyond_chain),
                     confidence: sure.as_ref().map_or(0.0, |own| own.confidence),
                     rivals: sure.map_or(Vec::new(), |own| own.rivals()),
                 }
             })
             .collect()
+    }
+
+    /// Whether a term is a memory that works through the force.
+    pub(super) fn remembers_force(&self, term: &Term) -> bool {
+        let mechanism = self.data.catalogue.get(term.entry);
+        let memory_s = mechanism.memory_s(&term.parameters, &self.data.context);
+        mechanism.facts().through_force && memory_s.is_some()
     }
 
     /// Whether a memory that works through the force was as good as one that stands but for how alike the runs speak for it.
@@ -167,4 +190,10 @@ impl<'a> Answer<'a> {
             .find(|p| p.balance == balance)
             .map(BalanceParts::white)
     }
+}
+
+/// Usable readings of the tyre's balance, at least one.
+fn tyre_readings(data: &Data) -> f64 {
+    let all = data.series.iter().map(Series::tyre_count);
+    all.sum::<usize>().max(1) as f64
 }

@@ -8,12 +8,14 @@ use crate::chain::correct::Lateness;
 use crate::constants::{
     LEAST_GAIN_OF_PREDICTION, LEAST_STDS_EXPORTED, LEAST_STDS_GAINED, MOST_WORSE,
 };
-use crate::data::Data;
+use crate::data::{Catalogue, Data};
 use crate::law::closest;
 use crate::mechanism::Stage;
-use crate::model::{Model, TYRE_BASE};
+use crate::model::{Model, TYRE_BASE, Term};
 use crate::number::{finite_or_zero, mean_and_std};
-use crate::repaired::{Domain, KnownRecording, NoiseModel, Repaired, RepairedTerm, Which};
+use crate::repaired::{
+    Domain, KnownRecording, NoiseModel, Predicting, Repaired, RepairedTerm, Which,
+};
 use crate::series::Series;
 
 /// Terms of a model with the covariance of all its parameters.
@@ -80,6 +82,27 @@ impl Answer<'_> {
         }
     }
 
+    /// What its repaired model predicts by without the memories of the force among its terms, with the law that then predicts
+    /// best; nothing where there is none.
+    pub(super) fn predicting_without_memories(&self, with: &Predicting) -> Option<Predicting> {
+        let Data {
+            catalogue, context, ..
+        } = &self.data;
+        let chosen = &self.decision.chosen.model;
+        let mut model = chosen.clone();
+        model.terms.retain(|term| !self.remembers_force(term));
+        if model.terms.len() == chosen.terms.len() {
+            return None;
+        }
+        let base = self.predicting_base(&model);
+        model.terms.retain(|term| !is_dynamic(catalogue, term));
+        Some(Predicting {
+            base,
+            tyre: Repaired::terms(catalogue, context, &model, &[]),
+            ..with.clone()
+        })
+    }
+
     /// The range of operation of the recordings.
     fn domain(&self) -> Domain {
         let data = &self.data;
@@ -125,9 +148,7 @@ impl Answer<'_> {
         for term in &chosen.model.terms {
             let own = at..at + term.parameters.len();
             at = own.end;
-            let stage = data.catalogue.get(term.entry).stage();
-            let dynamic = matches!(stage, Stage::Wheel | Stage::Vehicle);
-            if dynamic != tyre {
+            if is_dynamic(&data.catalogue, term) != tyre {
                 model.terms.push(term.clone());
                 places.extend(own);
             }
@@ -182,6 +203,12 @@ impl Answer<'_> {
         let drags = self.decision.chosen.drag_to_explain(data);
         closest(data, model, &drags).base
     }
+}
+
+/// Whether a term is of the wheel's balance or the vehicle's.
+fn is_dynamic(catalogue: &Catalogue, term: &Term) -> bool {
+    let stage = catalogue.get(term.entry).stage();
+    matches!(stage, Stage::Wheel | Stage::Vehicle)
 }
 
 /// Which recordings a repaired model predicts better than the law alone does.

@@ -4,7 +4,7 @@ use super::answer::{Answer, Given, NameOfForce};
 use super::figures::{fit_of, traces};
 use super::model_out::Predicts;
 use crate::audit::{Audit, Finding};
-use crate::constants::{BEYOND_REFUTATION, DOUBTED, TOLD_OF_CHANNEL};
+use crate::constants::{BEYOND_REFUTATION, DOUBTED, MOST_WORSE, TOLD_OF_CHANNEL};
 use crate::data::Catalogue;
 use crate::mechanism::{Balance, Describe, Facts, Id};
 use crate::outcome::{Diagnosis, Fit, NamedMechanism, Verdict};
@@ -17,6 +17,9 @@ struct Again {
     names: Vec<NameOfForce>,
     /// Whether a memory is among them, or would be were fewer runs as even as all of them.
     remembers: bool,
+    /// Whether what is kept is predicted worse by a percent of the squared error with the memories among them than without
+    /// any.
+    remembers_worse: bool,
 }
 
 /// What the argument came to, and how the model that it comes to without what is kept predicts that.
@@ -42,7 +45,8 @@ impl<'a> Proven<'a> {
         proving();
         let kept = Split::new(&given.data);
         let mut found = answer.repaired();
-        let mut names = None;
+        let mut again_names = None;
+        let mut without_memories = None;
         found.proof = if answer.found_nothing() {
             let law = given.plain_law(&kept, answer.to_predict.context.reach_factor);
             Predicting {
@@ -54,12 +58,15 @@ impl<'a> Proven<'a> {
             let not_asked = answer.not_asked.clone();
             let again = Answer::of(given, &kept, audit, Some(&answer), not_asked);
             again.map_or_else(Predicting::default, |again| {
-                let of_force = again.names_of_force();
-                names = Some(Again {
-                    remembers: of_force.iter().any(|name| name.remembers) || again.could_remember(),
-                    names: of_force,
+                let names = again.names_of_force();
+                again_names = Some(Again {
+                    remembers: names.iter().any(|name| name.remembers) || again.could_remember(),
+                    names,
+                    remembers_worse: false,
                 });
-                again.repaired().predicting()
+                let predicting = again.repaired().predicting();
+                without_memories = again.predicting_without_memories(&predicting);
+                predicting
             })
         };
         found.proof_by_blocks = kept.by_block;
@@ -67,17 +74,31 @@ impl<'a> Proven<'a> {
             recording.holdout = kept.keeps_whole(run);
         }
         // Where the tyre's balance cannot be formed there is no prediction to prove.
-        let predicted = if answer.data.forms(Balance::Tyre) {
-            found.unseeing().predicted(given.runs).unwrap_or_default()
-        } else {
-            Vec::new()
+        let predicted_by = |found: &Repaired| {
+            if answer.data.forms(Balance::Tyre) {
+                found.unseeing().predicted(given.runs).unwrap_or_default()
+            } else {
+                Vec::new()
+            }
         };
+        let predicted = predicted_by(&found);
         found.set_noise(&predicted);
         let fit = fit_of(&found, &predicted);
+        // With the law's two parameters fitted anew, not beside the law alone: what the timing of the channels does to a
+        // prediction is no memory's fault.
+        if let (Some(again), Some(proof)) = (&mut again_names, without_memories) {
+            let without = Repaired {
+                proof,
+                ..found.clone()
+            };
+            let fit_without = fit_of(&without, &predicted_by(&without));
+            let [own, other] = [&fit, &fit_without].map(|fit| fit.holdout.after.rmse_n.powi(2));
+            again.remembers_worse = own > MOST_WORSE * other;
+        }
         Some(Self {
             answer,
             kept,
-            again: names,
+            again: again_names,
             found,
             predicted,
             fit,
@@ -92,9 +113,9 @@ impl<'a> Proven<'a> {
     /// Names that the argument without what is kept speaks against.
     pub(super) fn refuted(&self) -> Vec<Id> {
         let named = self.answer.names_of_force();
-        self.again.as_ref().map_or_else(Vec::new, |again| {
-            refuted(&named, again, self.predicts_worse())
-        })
+        self.again
+            .as_ref()
+            .map_or_else(Vec::new, |again| refuted(&named, again))
     }
 
     /// What works through the force is not sure where the force is not predicted any better.
@@ -195,17 +216,18 @@ fn with_named(audit: &Audit, named: &[NamedMechanism], catalogue: &Catalogue) ->
 }
 
 /// Names that the same argument without what is kept speaks against: a memory where it knows of none at all, or names one
-/// and predicts what is kept worse than the law does, for the chain's own kernels do much of what a memory does; any other
+/// with which it predicts what is kept worse than without, for the chain's own kernels do much of what a memory does, but where
+/// it gains more than a chain leaves; any other
 /// where it does not come to that, nor to what is hardly likelier than that, but to another in its place that is no memory. What all
 /// recordings together make sure is not refuted by fewer.
-fn refuted(named: &[NameOfForce], again: &Again, worse: bool) -> Vec<Id> {
+fn refuted(named: &[NameOfForce], again: &Again) -> Vec<Id> {
     let has = |names: &[NameOfForce], id: Id| names.iter().any(|name| name.id == id);
     let other = |name: &NameOfForce| !name.remembers && !has(named, name.id);
     let another = again.names.iter().any(other);
     let rivals = |id: Id| again.names.iter().any(|name| name.rivals.contains(&id));
     let against = |name: &&NameOfForce| {
         let contradicted = if name.remembers {
-            worse && again.names.iter().any(|name| name.remembers) || !again.remembers
+            again.remembers_worse && !name.beyond_chain || !again.remembers
         } else {
             another && !has(&again.names, name.id) && !rivals(name.id)
         };
@@ -225,17 +247,20 @@ mod tests {
         NameOfForce {
             id,
             remembers,
+            beyond_chain: false,
             confidence: 0.8,
             rivals: Vec::new(),
         }
     }
 
     fn refuted(named: &[NameOfForce], again: &[NameOfForce], worse: bool) -> Vec<Id> {
+        let remembers = again.iter().any(|name| name.remembers);
         let again = Again {
             names: again.to_vec(),
-            remembers: again.iter().any(|name| name.remembers),
+            remembers,
+            remembers_worse: remembers && worse,
         };
-        super::refuted(named, &again, worse)
+        super::refuted(named, &again)
     }
 
     const LAG: NameOfForce = name(Id::ForceLag, true);
@@ -291,6 +316,13 @@ mod tests {
             ..LAG
         };
         assert!(refuted(&[sure], &[], true).is_empty());
+        // Of what no chain leaves a prediction says little, but it comes out again.
+        let large = NameOfForce {
+            beyond_chain: true,
+            ..LAG
+        };
+        assert!(refuted(std::slice::from_ref(&large), &[LAG], true).is_empty());
+        assert_eq!(refuted(&[large], &[], false), [Id::ForceLag]);
     }
 
     #[test]
@@ -298,15 +330,14 @@ mod tests {
         let again = Again {
             names: Vec::new(),
             remembers: true,
+            remembers_worse: false,
         };
-        assert!(super::refuted(&[LAG], &again, false).is_empty());
-        // A prediction in which there is no memory says nothing of one.
-        assert!(super::refuted(&[LAG], &again, true).is_empty());
+        assert!(super::refuted(&[LAG], &again).is_empty());
         let worn = Again {
             names: vec![WEAR],
             ..again
         };
-        assert!(super::refuted(&[LAG, WEAR], &worn, true).is_empty());
+        assert!(super::refuted(&[LAG, WEAR], &worn).is_empty());
     }
 
     #[test]

@@ -67,7 +67,7 @@ impl Describe for StructuralResonance {
         while frequency < top.min(150.0) {
             match self.form {
                 Form::Whole => starts.extend([0.03, 0.15].map(|zeta| vec![frequency, zeta])),
-                Form::Share => starts.push(vec![frequency, 0.03, 0.0]),
+                Form::Share => starts.extend([0.03, 0.12].map(|zeta| vec![frequency, zeta, 0.0])),
             }
             frequency *= 1.19;
         }
