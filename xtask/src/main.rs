@@ -2,6 +2,7 @@
 #![forbid(unsafe_code)]
 
 mod check;
+mod constants;
 mod cycles;
 mod estimators;
 mod figures;
@@ -130,6 +131,22 @@ enum Command {
         #[arg(long, default_value_t = 400)]
         large: u32,
     },
+    /// Halve and double each constant by which the diagnosis decides, on the same campaigns: what each moves. Hours; what is
+    /// judged already is not played again.
+    Constants {
+        /// Campaigns of each sort, of which there are five.
+        #[arg(long, default_value_t = 12)]
+        count: usize,
+        /// Seed of the campaigns, and the next one: below 999.
+        #[arg(long, default_value_t = 97)]
+        seed: u64,
+        /// Only constants whose name holds this.
+        #[arg(long)]
+        only: Option<String>,
+        /// Write docs/trials/constants.md.
+        #[arg(long)]
+        write: bool,
+    },
     /// Write the field guide, docs/mechanisms.md with its pictures, from what the mechanisms say of themselves.
     Mechanisms,
     /// Compile the core to WebAssembly for the pages' what-if, into crates/muslip-report/what-if.
@@ -209,6 +226,18 @@ fn main() -> anyhow::Result<()> {
             write,
             python,
         } => estimators::run_all(streams, write, python.as_deref()),
+        Command::Constants {
+            count,
+            seed,
+            only,
+            write,
+        } => constants::Study {
+            count,
+            seed,
+            only,
+            write,
+        }
+        .play(),
         Command::Mechanisms => mechanisms::write(),
         Command::WhatIf { check: true } => what_if::check(),
         Command::WhatIf { check: false } => what_if::write(),

@@ -97,7 +97,7 @@ fn git(arguments: &[&str]) -> Result<String> {
 }
 
 /// The commit that is checked out, where nothing differs from it but pages that this command writes.
-fn clean_commit() -> Result<String> {
+pub fn clean_commit() -> Result<String> {
     let changed = git(&["status", "--porcelain", "--", ".", ":!docs"])?;
     if !changed.is_empty() {
         bail!("figures are reported of a commit: commit first\n{changed}");

@@ -1,0 +1,275 @@
+//! The engine's sources with constants that can be set from outside.
+//!
+//! What users run has no such thing: a copy of the workspace is changed. Each scalar constant of the two tables becomes a
+//! function of the same name that reads [`TUNED`] once, and is called where the constant stood.
+
+use std::collections::BTreeSet;
+use std::fs;
+use std::path::Path;
+
+use anyhow::{Context, Result, ensure};
+
+use crate::step::{command, output, root};
+
+/// Environment variable that sets one constant: `path=value`.
+pub const TUNED: &str = "MUSLIP_CONSTANT";
+
+/// The engine's sources, ...
+const ENGINE: &str = "crates/muslip-diagnose/src";
+/// ... its tables of constants there, each with the path that a setting names.
+const TABLES: [(&str, &str); 2] = [
+    ("constants.rs", "constants"),
+    ("audit/constants.rs", "audit::constants"),
+];
+
+/// One constant.
+#[derive(Debug, PartialEq)]
+pub struct Constant {
+    table: &'static str,
+    name: String,
+    kind: String,
+    /// Its value.
+    pub value: f64,
+}
+
+impl Constant {
+    /// Table and name.
+    pub fn path(&self) -> String {
+        format!("{}::{}", self.table, self.name)
+    }
+
+    /// Halved and doubled; of what is a share or a probability, which doubled would be more than one, its odds are; a count is no
+    /// less than one.
+    pub fn varied(&self) -> [f64; 2] {
+        if self.kind != "f64" {
+            return [(0.5 * self.value).round().max(1.0), 2.0 * self.value];
+        }
+        [0.5, 2.0].map(|factor| {
+            let odds = factor * self.value / (1.0 - self.value);
+            if self.is_share() {
+                odds / (1.0 + odds)
+            } else {
+                factor * self.value
+            }
+        })
+    }
+
+    /// Whether it is no time, speed, gain or number of standard deviations, and between a half and one or little less.
+    fn is_share(&self) -> bool {
+        let of_unit = ["_NATS", "PREDICTED", "STD", "POWER", "SIGMA"];
+        let has_unit =
+            self.name.ends_with("_S") || of_unit.iter().any(|unit| self.name.contains(unit));
+        !has_unit && (0.4..1.0).contains(&self.value)
+    }
+}
+
+/// Writes the workspace into a folder with constants that can be set, and says which.
+///
+/// # Errors
+/// Where a file cannot be read or written, or a table holds no constant.
+pub fn write(folder: &Path) -> Result<Vec<Constant>> {
+    let mut constants = Vec::new();
+    for (file, table) in TABLES {
+        let file = root().join(ENGINE).join(file);
+        let text = fs::read_to_string(&file).with_context(|| file.display().to_string())?;
+        let found = found_in(&text, table);
+        ensure!(!found.is_empty(), "no constants in {}", file.display());
+        constants.extend(found);
+    }
+    for file in output(command("git", &["ls-files", "-z"]))?.split_terminator('\0') {
+        let to = folder.join(file);
+        fs::create_dir_all(to.parent().context("a file without a folder")?)?;
+        let bytes = fs::read(root().join(file)).with_context(|| file.to_owned())?;
+        let of_engine = file.strip_prefix(ENGINE).map(|file| &file[1..]);
+        let bytes = match of_engine.filter(|file| file.ends_with(".rs")) {
+            Some(file) => changed(file, &String::from_utf8(bytes)?, &constants).into_bytes(),
+            None => bytes,
+        };
+        write_new(&to, &bytes)?;
+    }
+    Ok(constants)
+}
+
+/// A file of the engine with constants that can be set.
+fn changed(file: &str, text: &str, constants: &[Constant]) -> String {
+    match TABLES.iter().find(|(table, _)| *table == file) {
+        Some((_, table)) => settable(text, table, constants),
+        None => calling(text, constants),
+    }
+}
+
+/// Writes what is not there yet: what is stays as old as it is, for whoever builds it.
+fn write_new(to: &Path, bytes: &[u8]) -> Result<()> {
+    if fs::read(to).is_ok_and(|there| there == bytes) {
+        return Ok(());
+    }
+    fs::write(to, bytes).with_context(|| to.display().to_string())
+}
+
+/// The scalar constants of a table: those with a literal for a value.
+fn found_in(text: &str, table: &'static str) -> Vec<Constant> {
+    text.lines()
+        .filter_map(|line| {
+            let (name, rest) = line.strip_prefix("pub const ")?.split_once(": ")?;
+            let (kind, value) = rest.strip_suffix(';')?.split_once(" = ")?;
+            let scalar = matches!(kind, "f64" | "usize" | "isize");
+            let value = value.replace('_', "").parse().ok().filter(|_| scalar)?;
+            Some(Constant {
+                table,
+                name: name.to_owned(),
+                kind: kind.to_owned(),
+                value,
+            })
+        })
+        .collect()
+}
+
+/// A table with functions in place of these constants.
+fn settable(text: &str, table: &str, constants: &[Constant]) -> String {
+    let of_line = |line: &str| {
+        let named = |c: &&Constant| {
+            c.table == table && line.starts_with(&format!("pub const {}: ", c.name))
+        };
+        constants.iter().find(named)
+    };
+    let mut all = String::new();
+    for line in text.lines() {
+        match of_line(line) {
+            Some(constant) => all.push_str(&function(constant)),
+            None => all.push_str(line),
+        }
+        all.push('\n');
+    }
+    all
+}
+
+fn function(constant: &Constant) -> String {
+    let Constant {
+        name, kind, value, ..
+    } = constant;
+    let path = constant.path();
+    format!(
+        r#"#[allow(non_snake_case, clippy::all, clippy::pedantic)]
+#[must_use]
+pub fn {name}() -> {kind} {{
+    static VALUE: std::sync::LazyLock<{kind}> = std::sync::LazyLock::new(|| {{
+        let set = std::env::var("{TUNED}").unwrap_or_default();
+        match set.strip_prefix("{path}=") {{
+            Some(value) => value.parse::<f64>().expect("a number") as {kind},
+            None => {value:?} as {kind},
+        }}
+    }});
+    *VALUE
+}}"#
+    )
+}
+
+/// Sources that call what they import of a table.
+fn calling(text: &str, constants: &[Constant]) -> String {
+    let mut imported = imported(text);
+    imported.retain(|name| constants.iter().any(|c| c.name == *name));
+    let mut all = String::new();
+    let mut importing = false;
+    for line in text.lines() {
+        let code = line.trim_start();
+        importing |= is_import(code);
+        if importing || code.starts_with("//") {
+            all.push_str(line);
+        } else {
+            all.push_str(&called(line, &imported));
+        }
+        importing &= !code.ends_with(';');
+        all.push('\n');
+    }
+    all
+}
+
+fn is_import(code: &str) -> bool {
+    code.starts_with("use ") || code.starts_with("pub use ")
+}
+
+/// Names that a file imports of a table.
+fn imported(text: &str) -> BTreeSet<&str> {
+    let mut names = BTreeSet::new();
+    for statement in text.split(';') {
+        let import = statement.rfind("use ").map(|at| &statement[at..]);
+        let of_table = import.and_then(|import| import.split_once("constants::"));
+        if let Some((_, list)) = of_table {
+            names.extend(
+                list.split(|c: char| !is_of_name(c))
+                    .filter(|n| !n.is_empty()),
+            );
+        }
+    }
+    names
+}
+
+fn is_of_name(c: char) -> bool {
+    c.is_ascii_alphanumeric() || c == '_'
+}
+
+/// A line that calls these names.
+fn called(line: &str, names: &BTreeSet<&str>) -> String {
+    let mut all = String::new();
+    let mut rest = line;
+    while let Some(start) = rest.find(is_of_name) {
+        let name = &rest[start..];
+        let end = name.find(|c| !is_of_name(c)).unwrap_or(name.len());
+        all.push_str(&rest[..start + end]);
+        if names.contains(&name[..end]) {
+            all.push_str("()");
+        }
+        rest = &name[end..];
+    }
+    all.push_str(rest);
+    all
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const TABLE: &str = "/// Steps.\npub const STEPS: usize = 6_000;\npub const SHARE: f64 = 0.7;\npub const RANGE: (f64, f64) = (0.0, 1.0);\n";
+
+    #[test]
+    fn constants_with_a_literal_are_found_and_become_functions() {
+        let found = found_in(TABLE, "constants");
+        let paths: Vec<String> = found.iter().map(Constant::path).collect();
+        assert_eq!(paths, ["constants::STEPS", "constants::SHARE"]);
+        let set = settable(TABLE, "constants", &found);
+        assert!(set.contains("pub fn STEPS() -> usize"));
+        assert!(set.contains("pub const RANGE: (f64, f64)"));
+        assert!(!set.contains("pub const STEPS"));
+    }
+
+    #[test]
+    fn a_share_stays_below_one_and_a_count_above_nothing() {
+        let of = |name: &str, kind: &str, value| {
+            Constant {
+                table: "constants",
+                name: name.into(),
+                kind: kind.into(),
+                value,
+            }
+            .varied()
+        };
+        assert_eq!(of("LEAST_T", "f64", 3.0), [1.5, 6.0]);
+        assert_eq!(of("MOST_NAMES", "usize", 1.0), [1.0, 2.0]);
+        // Odds of nine to one become four and a half and eighteen to one.
+        let [lower, higher] = of("TIED", "f64", 0.9);
+        assert!((lower - 9.0 / 11.0).abs() < 1e-12 && (higher - 18.0 / 19.0).abs() < 1e-12);
+        assert_eq!(of("OWN_LAG_S", "f64", 0.8), [0.4, 1.6]);
+    }
+
+    #[test]
+    fn only_what_a_file_imports_of_a_table_is_called() {
+        let table = "pub const LEAST_T: f64 = 2.0;\npub const SHARE: f64 = 0.7;\n";
+        let constants = found_in(table, "constants");
+        let text = "use crate::constants::{\n    LEAST_T, RANGE, SHARE,\n};\n// LEAST_T\nconst STEP_SHARE: f64 = 0.5;\nif t > LEAST_T * STEP_SHARE && SHARES > SHARE && RANGE.0 < 1.0 {}\n";
+        let all = calling(text, &constants);
+        assert!(all.ends_with(
+            "// LEAST_T\nconst STEP_SHARE: f64 = 0.5;\nif t > LEAST_T() * STEP_SHARE && SHARES > SHARE() && RANGE.0 < 1.0 {}\n"
+        ));
+        assert!(all.starts_with("use crate::constants::{\n    LEAST_T, RANGE, SHARE,\n};\n"));
+    }
+}
