@@ -41,20 +41,18 @@ impl Constant {
     /// Halved and doubled; of what is a share or a probability, which doubled would be more than one, its odds are; a count is no
     /// less than one.
     pub fn varied(&self) -> [f64; 2] {
+        let factors = [0.5, 2.0];
         if self.kind != "f64" {
-            return [(0.5 * self.value).round().max(1.0), 2.0 * self.value];
+            factors.map(|factor| (factor * self.value).round().max(1.0))
+        } else if self.is_share() {
+            let odds = self.value / (1.0 - self.value);
+            factors.map(|factor| factor * odds / (1.0 + factor * odds))
+        } else {
+            factors.map(|factor| factor * self.value)
         }
-        [0.5, 2.0].map(|factor| {
-            let odds = factor * self.value / (1.0 - self.value);
-            if self.is_share() {
-                odds / (1.0 + odds)
-            } else {
-                factor * self.value
-            }
-        })
     }
 
-    /// Whether it is no time, speed, gain or number of standard deviations, and between a half and one or little less.
+    /// Whether it is a number from 0.4 to one without a unit: by its name no time, speed, gain or standard deviation.
     fn is_share(&self) -> bool {
         let of_unit = ["_NATS", "PREDICTED", "STD", "POWER", "SIGMA"];
         let has_unit =
