@@ -192,7 +192,12 @@ impl Answer<'_> {
         let gained = surely_gained(&unseen);
         Predicts {
             known: gained || surely_gained(&known),
-            unseen: gained && next_gains(&shares, LEAST_STDS_EXPORTED),
+            unseen: gained
+                && next_gains(&shares, LEAST_STDS_EXPORTED)
+                && self
+                    .decision
+                    .chosen
+                    .law_outweighs_corrections(&self.to_predict),
         }
     }
 

@@ -17,6 +17,7 @@ use crate::mechanism::Balance;
 use crate::model::Model;
 use crate::number::finite_or_zero;
 use crate::repaired::Correction;
+use crate::variable::Variable;
 
 /// A model at its best, and what it says of every run.
 #[derive(Clone)]
@@ -96,13 +97,17 @@ impl Judged {
     /// What the corrections add to the model's reading in N, by run.
     #[must_use]
     pub fn corrected(&self, data: &Data) -> Vec<Vec<f64>> {
+        self.added(data, &self.corrections(data))
+    }
+
+    /// What some corrections add to it.
+    fn added(&self, data: &Data, corrections: &[Correction]) -> Vec<Vec<f64>> {
         let mut all: Vec<Vec<f64>> = data.series.iter().map(|s| vec![0.0; s.len()]).collect();
-        let corrections = self.corrections(data);
         if corrections.is_empty() {
             return all;
         }
         let levers = Levers::new(data, &self.model);
-        for correction in &corrections {
+        for correction in corrections {
             for (run, sum) in all.iter_mut().enumerate() {
                 let added = correction.apply(data, &levers, run).unwrap_or_default();
                 for (sum, added) in sum.iter_mut().zip(added) {
@@ -111,6 +116,21 @@ impl Judged {
             }
         }
         all
+    }
+
+    /// Whether law and terms make more of the model's reading, in the mean square, than is added to it by anything but the slip.
+    /// What outweighs the law it is beside has taken its place: by the slip that is another curve, by anything else it draws
+    /// the recordings that it was made from, and says nothing of the next.
+    #[must_use]
+    pub fn law_outweighs_corrections(&self, data: &Data) -> bool {
+        let sum_of_squares = |all: &[Vec<f64>]| {
+            let all = all.iter().flatten().filter(|x| x.is_finite());
+            all.map(|x| x * x).sum::<f64>()
+        };
+        let mut corrections = self.corrections(data);
+        corrections.retain(|own| own.variable != Variable::Slip.key(data));
+        let added = sum_of_squares(&self.added(data, &corrections));
+        added == 0.0 || added < sum_of_squares(&Levers::new(data, &self.model).force)
     }
 
     /// The drag as recorded less what the corrections add, in N, by run: what is left to law and terms.
@@ -123,5 +143,37 @@ impl Judged {
             }
         }
         drags
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::correction::Action;
+    use crate::innovations::dependence;
+    use crate::innovations::hypothesis::{Guess, judge};
+    use crate::innovations::toy::{EFFORT, Noise, settled, stop};
+    use crate::variable::Variable;
+
+    #[test]
+    fn what_adds_more_than_the_law_takes_its_place() {
+        let data = stop(Noise::TYPICAL, 4);
+        let base = settled(&data);
+        assert!(base.law_outweighs_corrections(&data), "none to outweigh");
+        let free = |variable: &Variable| {
+            let mut all = dependence::all(&data).into_iter();
+            all.find(|own| own.variable == *variable && own.action == Action::Friction)
+                .unwrap()
+        };
+        // The same share of the law's own force throughout, but at the knot that stands for all of it.
+        let outweighs = |variable: &Variable, share: f64| {
+            let extra = [free(variable)];
+            let mut judged = judge(&data, &base.model, &extra, Guess::None, EFFORT).unwrap();
+            let from = judged.model.free_places().len();
+            judged.left.rows_mut(from, extra[0].width()).fill(share);
+            !judged.law_outweighs_corrections(&data)
+        };
+        assert!(!outweighs(&Variable::Time, 0.9) && !outweighs(&Variable::Time, -0.9));
+        assert!(outweighs(&Variable::Time, 3.0));
+        assert!(!outweighs(&Variable::Slip, 3.0), "another curve");
     }
 }
