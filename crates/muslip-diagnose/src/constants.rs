@@ -94,6 +94,9 @@ pub const LEAST_CONFIDENCE: f64 = 0.45;
 /// Confidence from which a name that says what a channel does is told among the findings of the chain, too: there nothing is
 /// said to be likely. Three runs make nothing as sure.
 pub const TOLD_OF_CHANNEL: f64 = 0.9;
+/// Least standard deviations by which a figure of a name differs from none for the name to be said: of 255 names on 338
+/// development campaigns five had less, three false ones and two ripples of a sensor.
+pub const LEAST_STDS_OF_FIGURE: f64 = 3.0;
 /// What so many runs can make sure, at least, for an unlikely name to be left unsaid: four do. With fewer no name gets far.
 pub const FEW_RUNS_SURE: f64 = 0.9;
 /// Share of a name's likelihood from which nothing in the recordings tells an alias from it.

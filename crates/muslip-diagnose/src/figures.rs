@@ -93,6 +93,16 @@ pub fn with_form(own: f64, reported: &Reported<f64>, data: &Data) -> f64 {
     own.hypot(form_share(reported.name) * deviation(reported, data))
 }
 
+/// By how many standard deviations a figure differs from what it would be if nothing were missing; a place has no such value.
+#[must_use]
+pub fn stds_from_none(reported: &Reported<f64>, std: f64, data: &Data) -> f64 {
+    if reported.name == "start" {
+        f64::INFINITY
+    } else {
+        deviation(reported, data) / std.max(1e-12)
+    }
+}
+
 /// Size of a figure against what it would be if nothing were missing: a radius of 0.313 m for one of 0.310 m is
 /// a small deviation of a large figure.
 fn deviation(reported: &Reported<f64>, data: &Data) -> f64 {

@@ -145,3 +145,21 @@ pub const LONGEST_ROLLING_S: f64 = 8.0;
 pub const ROLLING_EXPLAINED: f64 = 0.5;
 /// Least scale of a speed that is told: by half a percent a tyre's radius changes with load and pressure.
 pub const LEAST_SCALE: f64 = 0.005;
+
+// Ringing of the drag.
+
+/// Longest window of its spectra, s: what decays within it shows its width.
+pub const RING_WINDOW_S: f64 = 1.5;
+/// Slowest ring that is looked for, Hz.
+pub const RING_SLOWEST_HZ: f64 = 5.0;
+/// Fastest, as a share of the sampling rate: above it filters and decimation end the spectrum.
+pub const RING_FASTEST: f64 = 0.2;
+/// Least gain on unseen runs, nats: of 576 campaigns without a mode none in which the
+/// runs are as alike has 150.
+pub const RING_LEAST_NATS: f64 = 200.0;
+/// Least t of the gains' signed roots.
+pub const RING_ALIKE_T: f64 = 3.0;
+/// Orders of the wheel's turning that are no ring.
+pub const RING_ORDERS: [f64; 3] = [1.0, 2.0, 3.0];
+/// How near to an order a frequency is that order's, as a share of it.
+pub const RING_NEAR_ORDER: f64 = 0.08;

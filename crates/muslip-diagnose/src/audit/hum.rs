@@ -48,7 +48,7 @@ fn angle(run: &Recording) -> Vec<f64> {
 }
 
 /// Pieces of a run without gaps, as first and one past the last reading.
-fn pieces(run: &Recording) -> Vec<(usize, usize)> {
+pub(super) fn pieces(run: &Recording) -> Vec<(usize, usize)> {
     let breaks: Vec<bool> = (0..run.time.len())
         .map(|k| k > 0 && run.time[k] - run.time[k - 1] > GAP_S.max(8.0 * run.step))
         .collect();
@@ -104,7 +104,7 @@ fn windows(runs: &[Recording]) -> (Vec<Window>, f64) {
 
 /// The Fourier transform of so many readings. The library's own choice among its algorithms is quicker and compiles all
 /// of them, which took a third of what this crate takes to compile.
-fn transform(readings: usize) -> BluesteinsAlgorithm<f64> {
+pub(super) fn transform(readings: usize) -> BluesteinsAlgorithm<f64> {
     let inner = Radix4::new((2 * readings).next_power_of_two(), FftDirection::Forward);
     BluesteinsAlgorithm::new(readings, Arc::new(inner))
 }

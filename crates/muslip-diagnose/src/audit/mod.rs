@@ -28,6 +28,7 @@ pub mod leak;
 pub mod line;
 pub mod recording;
 pub mod resampled;
+pub mod ring;
 pub mod rolling;
 pub mod signal;
 pub mod simple;
@@ -43,6 +44,7 @@ pub mod vehicle;
 pub mod wheel;
 
 pub use finding::{Finding, Timing, Word};
+pub use ring::Ring;
 
 use rayon::prelude::*;
 
@@ -65,6 +67,8 @@ pub struct Audit {
     pub timings: Timings,
     /// Slow noise of the vehicle speed.
     pub vehicle_colour: Option<Colour>,
+    /// A ring of the drag.
+    pub ring: Option<Ring>,
     /// A hum of the drag that stands out of its noise.
     pub loud_hum: Option<hum::Hum>,
     /// What the channels themselves show.
@@ -235,6 +239,7 @@ pub fn audit(rig: &Rig, runs: &[Run]) -> Audit {
         vehicle_late: timings.vehicle,
         brake_late: timings.brake,
         vehicle_colour,
+        ring: ring::ring(&recordings, hum.as_ref().map(|hum| hum.frequency_hz)),
         loud_hum: hum.filter(|hum| hum.share > HUM_BEYOND_NOISE),
         findings,
         resampled: resampled::findings(runs),

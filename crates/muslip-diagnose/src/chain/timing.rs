@@ -141,6 +141,18 @@ impl Timing {
         value + known < -least
     }
 
+    /// By how much the brake is read before its torque acts, as drag and wheel speed bear out alike: what both make of it is no
+    /// lateness of the drag. Nothing where that is left to physics, or not known.
+    #[must_use]
+    pub fn brake_before_torque(&self) -> Option<Late> {
+        let [wheel, brake] = [self.wheel, self.brake].map(|late| self.against_drag(late));
+        let known = self.brake_heard && [wheel, brake].iter().all(|late| late.std < VAGUE_S);
+        (known && !self.leaves_brake).then(|| Late {
+            value: wheel.value.min(0.0) - brake.value,
+            std: wheel.std.hypot(brake.std),
+        })
+    }
+
     /// Leaves the brake's reading as early as it is.
     fn leave_brake(&mut self) {
         self.leaves_brake = true;
@@ -425,6 +437,26 @@ mod tests {
         let mut left = timing(-0.010, -0.010, -0.018);
         left.leave(0.010);
         assert!(!left.brake_early());
+    }
+
+    #[test]
+    fn a_brake_is_read_before_its_torque_by_what_neither_drag_nor_wheel_shows() {
+        let before = |wheel: f64, brake: f64| {
+            let mut timing = timing(wheel, 0.02, brake);
+            timing.brake_heard = true;
+            timing.brake_before_torque().map(|late| late.value)
+        };
+        assert!((before(-0.004, -0.015).unwrap() - 0.011).abs() < 1e-12);
+        assert!((before(0.003, -0.012).unwrap() - 0.012).abs() < 1e-12);
+        assert!(
+            before(-0.016, -0.014).unwrap() < 0.0,
+            "the drag may be late"
+        );
+        let mut left = timing(0.0, 0.0, -0.03);
+        assert!(left.brake_before_torque().is_none(), "not heard");
+        left.brake_heard = true;
+        left.leave_brake();
+        assert!(left.brake_before_torque().is_none());
     }
 
     #[test]

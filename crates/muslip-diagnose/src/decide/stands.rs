@@ -129,10 +129,13 @@ fn gains_on_unseen_runs(trial: &Trial) -> bool {
     trial.gain > least_gain_of_name(trial) && mean > 0.0 && t > LEAST_T_OF_LIKELIER
 }
 
-/// Whether a name is of use beside others that were named: whatever it is worth alone was settled when it was taken up.
+/// Whether a name is of use beside others that were named: whatever it is worth alone was settled when it was taken up. Of
+/// what a measuring chain leaves, too, the others may have left the rest.
 #[must_use]
 pub fn needed(trial: &Trial) -> bool {
-    gains_on_unseen_runs(trial) || hidden(trial)
+    let (mean, t) = trial.unseen;
+    let still_gains = !trial.fed_by_chain && trial.gain > 0.0 && mean > 0.0;
+    still_gains && t > LEAST_T_OF_LIKELIER || gains_on_unseen_runs(trial) || hidden(trial)
 }
 
 /// Whether unseen runs gain, and alike, where their own differences are no larger than sensors make plausible.
@@ -190,7 +193,9 @@ fn seen_on_unseen_runs(trial: &Trial) -> bool {
                 LEAST_T
             };
             let several = trial.runs >= FEWEST_RUNS_AGREED;
-            mean > 0.0 && (t >= least || trial.unanimous[0] && (clearly || large && several))
+            let few_reach =
+                trial.unanimous[0] && (clearly || large && several) || several && undisputed(trial);
+            mean > 0.0 && (t >= least || few_reach)
         }
         // What says nothing of what it is has to be seen at the sensors' noise as well: fitted noise may have left it.
         Claim::Dependence(_) => {
@@ -198,6 +203,15 @@ fn seen_on_unseen_runs(trial: &Trial) -> bool {
             mean > 0.0 && t >= LEAST_T_OF_DEPENDENCE && at_sensors
         }
     }
+}
+
+/// Whether a name that no measuring chain leaves gains much at both levels of the noise, and hardly a run speaks against it:
+/// what few runs reach, a channel's limit, makes gains so uneven that no t shows it.
+#[must_use]
+pub fn undisputed(trial: &Trial) -> bool {
+    let least = LARGE_TO_WORTH * worth(trial);
+    let much = trial.gain > least && trial.at_sensors.0 > least;
+    much && trial.unanimous == [true; 2] && !trial.fed_by_chain
 }
 
 /// Whether the drag's mean square error falls by more than this logarithm. What does not work through the force predicts
@@ -322,7 +336,60 @@ mod tests {
                 ..wear(3.6, 0.32)
             },
         ];
-        assert!(refused.iter().all(|trial| !stands(trial) && !needed(trial)));
+        assert!(refused.iter().all(|trial| !stands(trial)));
+    }
+
+    #[test]
+    fn a_name_that_still_gains_is_needed_unless_a_chain_leaves_as_much() {
+        let data = stop(Noise::TYPICAL, 4);
+        let base = toy::settled(&data);
+        let wear = |nats: f64, t: f64| Trial {
+            at_sensors: (2.0, 1.0),
+            ..of_name(&data, &base, Id::WearDrift, nats, t)
+        };
+        assert!(needed(&wear(2.0, 2.6)));
+        assert!(!needed(&wear(-0.1, 2.6)) && !needed(&wear(2.0, 0.9)));
+        let fed = |nats: f64| Trial {
+            fed_by_chain: true,
+            ..wear(nats, 2.6)
+        };
+        assert!(!needed(&fed(2.0)) && needed(&fed(9.0)));
+    }
+
+    #[test]
+    fn what_few_runs_reach_and_none_disputes_stands_where_no_chain_leaves_the_like() {
+        let data = stop(Noise::TYPICAL, 4);
+        let base = toy::settled(&data);
+        let limit = |nats: f64| Trial {
+            // Of so many, five nats are worth a name.
+            readings: 2000,
+            unseen: (nats / 6.0, 1.2),
+            predicts: 0.08,
+            unanimous: [true, true],
+            at_sensors: (80.0, 1.1),
+            ..of_name(&data, &base, Id::ForceSaturation, nats, 1.2)
+        };
+        assert!(stands(&limit(60.0)));
+        let refused = [
+            limit(5.0),
+            Trial {
+                at_sensors: (5.0, 1.1),
+                ..limit(60.0)
+            },
+            Trial {
+                unanimous: [true, false],
+                ..limit(60.0)
+            },
+            Trial {
+                fed_by_chain: true,
+                ..limit(60.0)
+            },
+            Trial {
+                runs: 3,
+                ..limit(60.0)
+            },
+        ];
+        assert!(refused.iter().all(|trial| !stands(trial)));
     }
 
     #[test]

@@ -39,6 +39,23 @@ pub(super) struct NameOfForce {
     pub(super) rivals: Vec<Id>,
 }
 
+/// Why a name is not said.
+#[derive(Clone, Copy)]
+pub(super) enum Why {
+    /// None of its figures is told from none.
+    NoFigure,
+    /// It is too unlikely: its confidence.
+    Unlikely(f64),
+}
+
+/// A name that is not said.
+pub(super) struct Unsaid {
+    /// Its entry in the catalogue.
+    pub(super) entry: usize,
+    /// Why.
+    pub(super) why: Why,
+}
+
 /// What the argument came to, made without what is kept.
 pub(super) struct Answer<'a> {
     pub(super) given: &'a Given<'a>,
@@ -51,8 +68,8 @@ pub(super) struct Answer<'a> {
     /// What unseen runs refuted before.
     pub(super) not_asked: Vec<Id>,
     pub(super) decision: Decision,
-    /// Entries of names that were too unlikely to be said, and how likely they were.
-    pub(super) unsaid: Vec<(usize, f64)>,
+    /// Names that came out and are not said.
+    pub(super) unsaid: Vec<Unsaid>,
 }
 
 impl<'a> Answer<'a> {
@@ -101,8 +118,8 @@ impl<'a> Answer<'a> {
             decision,
             unsaid: Vec::new(),
         };
-        answer.unsaid = answer.unlikely();
-        let unsaid: Vec<usize> = answer.unsaid.iter().map(|own| own.0).collect();
+        answer.unsaid = answer.not_said();
+        let unsaid: Vec<usize> = answer.unsaid.iter().map(|own| own.entry).collect();
         answer.decision = answer.decision.without(&answer.data, &unsaid);
         Some(answer.with_whole_level())
     }

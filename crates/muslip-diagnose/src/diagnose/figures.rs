@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::answer::Answer;
+use super::answer::{Answer, Why};
 use super::named::least_delay;
 use crate::constants::{POWER, VAGUE_DELAY_S};
 use crate::looked::looked_for;
@@ -120,11 +120,14 @@ impl Answer<'_> {
                 words(id)
             ));
         }
-        for &(entry, likely) in &self.unsaid {
+        for own in &self.unsaid {
+            let why = match own.why {
+                Why::NoFigure => "but none of its figures is told from none".to_owned(),
+                Why::Unlikely(sure) => format!("with a confidence of {:.0} % only", 100.0 * sure),
+            };
             caveats.push(format!(
-                "Not named: {}, which would fit, with a confidence of {:.0} % only.",
-                words(self.data.catalogue.get(entry).id()),
-                100.0 * likely
+                "Not named: {}, which would fit, {why}.",
+                words(self.data.catalogue.get(own.entry).id()),
             ));
         }
         if kept.by_block {

@@ -2,16 +2,17 @@
 
 use std::collections::BTreeMap;
 
-use super::answer::Answer;
-use crate::audit::Timing;
+use super::answer::{Answer, Unsaid, Why};
+use crate::audit::{Ring, Timing};
 use crate::constants::{
-    AUDITED, DOUBTED, FEW_RUNS_SURE, FORM_OF_DELAY_S, HARDLY_LESS, LEAST_CONFIDENCE, LEAST_DELAY_S,
-    LEAST_PREDICTED, PREDICTED_APART, RARE_SHARE, SURE_DELAY, TIED, VAGUE_DELAY_S,
+    AUDITED, DOUBTED, FEW_RUNS_SURE, FORM_OF_DELAY_S, HARDLY_LESS, LEAST_BRAKE_EARLY_IN_STEP_S,
+    LEAST_CONFIDENCE, LEAST_DELAY_S, LEAST_PREDICTED, LEAST_STDS_OF_FIGURE, LEAST_T_NOT_FED,
+    PREDICTED_APART, RARE_SHARE, SURE_DELAY, TIED, UNKNOWN_STDS, VAGUE_DELAY_S,
 };
-use crate::decide::{Claim, Trial, rivals, softness};
-use crate::figures::{figures, with_form};
+use crate::decide::{Claim, Trial, rivals, softness, undisputed};
+use crate::figures::{figures, stds_from_none, with_form};
 use crate::innovations::dependence::Dependence;
-use crate::mechanism::{Balance, Id, Reported, Speed};
+use crate::mechanism::{Audited, Balance, Id, Reported, Speed};
 use crate::number::finite_or_zero;
 use crate::outcome::{
     Alternative, Evidence, NamedMechanism, ReportedParameter, Unexplained, sentence,
@@ -28,6 +29,7 @@ impl Answer<'_> {
     pub(super) fn mechanisms(&self) -> Vec<NamedMechanism> {
         let mut all = self.named();
         all.extend(self.named_delays());
+        all.extend(self.named_by_audit());
         all.sort_by(|a, b| b.evidence.delta_bic.total_cmp(&a.evidence.delta_bic));
         all
     }
@@ -96,7 +98,12 @@ impl Answer<'_> {
         } else {
             DOUBTED
         };
-        let sure = confidence(share, trial.steadiness(), self.data.series.len());
+        let steadiness = if undisputed(trial) {
+            trial.steadiness().max(LEAST_T_NOT_FED)
+        } else {
+            trial.steadiness()
+        };
+        let sure = confidence(share, steadiness, self.data.series.len());
         let sureness = Sureness {
             share,
             confidence: sure.min(most),
@@ -105,23 +112,42 @@ impl Answer<'_> {
         Some((trial, sureness))
     }
 
-    /// Entries of the names that are too unlikely to be said, and how likely they are. Few recordings make no name likely:
-    /// there each is said.
-    pub(super) fn unlikely(&self) -> Vec<(usize, f64)> {
-        if surest(self.data.series.len()) < FEW_RUNS_SURE {
-            return Vec::new();
-        }
-        let terms = self.decision.chosen.model.terms.iter();
-        let unlikely = terms.filter_map(|term| {
+    /// Names that are not said: none of whose figures is told from none, or that are too unlikely. Few recordings make no name
+    /// likely: there each is said that has a figure.
+    pub(super) fn not_said(&self) -> Vec<Unsaid> {
+        let few = surest(self.data.series.len()) < FEW_RUNS_SURE;
+        let terms = self.decision.chosen.model.terms.iter().enumerate();
+        let not_said = terms.filter_map(|(place, term)| {
             let (_, sure) = self.sureness(term.entry)?;
             let aliases = self.data.catalogue.get(term.entry).id().aliases();
             let of_alias =
                 |other: &&Alternative| aliases.iter().any(|a| a.with.as_str() == other.id);
             let aliases = sure.others.iter().filter(of_alias).map(|o| o.confidence);
             let tied = tied(sure.share, aliases) / sure.share.max(1e-9);
-            (!likely(sure.confidence, tied)).then_some((term.entry, sure.confidence))
+            let why = if !self.has_a_figure(place) {
+                Why::NoFigure
+            } else if few || likely(sure.confidence, tied) {
+                return None;
+            } else {
+                Why::Unlikely(sure.confidence)
+            };
+            Some(Unsaid {
+                entry: term.entry,
+                why,
+            })
         });
-        unlikely.collect()
+        not_said.collect()
+    }
+
+    /// Whether a figure of a term is told from what it would be without the term.
+    fn has_a_figure(&self, place: usize) -> bool {
+        let chosen = &self.decision.chosen;
+        let covariance = self.covariance(chosen);
+        let figures = figures(&self.data, &chosen.model, &covariance, place);
+        let told = |(own, std): &(Reported<f64>, f64)| {
+            stds_from_none(own, *std, &self.data) > LEAST_STDS_OF_FIGURE
+        };
+        figures.iter().any(told)
     }
 
     /// What no name accounts for: dependences of the chosen model, the one that is left beside it, and a hum that stands
@@ -173,15 +199,64 @@ impl Answer<'_> {
     /// Delays of the speeds that the base simulation's residuals show.
     pub(super) fn named_delays(&self) -> Vec<NamedMechanism> {
         let delays = self.data.catalogue.delays().into_iter();
-        delays
-            .filter_map(|id| {
-                let [late, audited] = self.delays_of(id)?;
-                let sure = late.std < VAGUE_DELAY_S && late.value > least_delay(&late);
-                // Fitted with a law that may be wrong it is believed where the audit, which has none, says so too.
-                let told = audited.value > AUDITED * audited.std;
-                (sure && told).then(|| self.delay(id, late.value, late.std))?
-            })
-            .collect()
+        let named = delays.filter_map(|id| {
+            let [late, audited] = self.delays_of(id)?;
+            let sure = late.std < VAGUE_DELAY_S && late.value > least_delay(&late);
+            // Fitted with a law that may be wrong it is believed where the audit, which has none, says so too.
+            let told = audited.value > AUDITED * audited.std;
+            (sure && told).then(|| self.delay(id, "delay", late, 1.0))?
+        });
+        named.collect()
+    }
+
+    /// What the audit shows of mechanisms that the decision neither names nor has given up. A logger out of step, or a
+    /// vibration that is none of the load cell's, may look the same.
+    fn named_by_audit(&self) -> Vec<NamedMechanism> {
+        let catalogue = &self.data.catalogue;
+        let terms = self.decision.chosen.model.terms.iter();
+        let unsaid = self.unsaid.iter().map(|own| own.entry);
+        let entries = terms.map(|term| term.entry).chain(unsaid);
+        let ids = entries.map(|entry| catalogue.get(entry).id());
+        let settled: Vec<Id> = ids.chain(self.not_asked.iter().copied()).collect();
+        let shown = catalogue.entries().iter().filter_map(|mechanism| {
+            let facts = mechanism.facts();
+            match facts.audited.filter(|_| !settled.contains(&facts.id))? {
+                Audited::EarlyBrake => self.late_torque(facts.id),
+                Audited::Ring => self.ring(facts.id),
+            }
+        });
+        shown.collect()
+    }
+
+    /// A lag of the brake, by how much its reading comes before its torque.
+    fn late_torque(&self, id: Id) -> Option<NamedMechanism> {
+        let late = self.timing.brake_before_torque()?;
+        let audited = self.audit.brake_late;
+        let told = audited.value < -AUDITED * audited.std;
+        let sure = late.value > LEAST_BRAKE_EARLY_IN_STEP_S + UNKNOWN_STDS * late.std;
+        (told && sure).then(|| self.delay(id, "time_constant", late, DOUBTED))?
+    }
+
+    /// A mode of the load cell, by the drag's spectrum.
+    fn ring(&self, id: Id) -> Option<NamedMechanism> {
+        let Ring {
+            frequency_hz,
+            frequency_std_hz,
+            damping_ratio,
+            damping_std,
+            gain,
+        } = self.audit.ring?;
+        let figures = [
+            (
+                Reported::new("frequency", "Hz", frequency_hz),
+                frequency_std_hz,
+            ),
+            (
+                Reported::new("damping_ratio", "1", damping_ratio),
+                damping_std,
+            ),
+        ];
+        self.told(id, &figures, 2.0 * gain, DOUBTED)
     }
 
     /// What the timing says of a delay that is its own to name.
@@ -198,25 +273,38 @@ impl Answer<'_> {
         Some([self.timing.against_drag(fitted), audited])
     }
 
-    /// A delay as a mechanism, in that mechanism's own words.
-    fn delay(&self, id: Id, value: f64, std: f64) -> Option<NamedMechanism> {
+    /// A delay as a mechanism; its parameter's name, and the most that it can be sure.
+    fn delay(&self, id: Id, name: &'static str, late: Timing, most: f64) -> Option<NamedMechanism> {
+        let z = late.value.abs() / late.std.max(1e-5);
+        let figures = [(Reported::new(name, "s", late.value), late.std)];
+        self.told(id, &figures, z * z, most)
+    }
+
+    /// What timing or audit tell as a mechanism, in that mechanism's own words; with each figure's standard deviation.
+    fn told(
+        &self,
+        id: Id,
+        figures: &[(Reported<f64>, f64)],
+        delta_bic: f64,
+        most: f64,
+    ) -> Option<NamedMechanism> {
         let mechanism = self.data.catalogue.of(id)?;
-        let reported = Reported::new("delay", "s", value);
-        let z = value.abs() / std.max(1e-5);
+        let reported: Vec<Reported<f64>> = figures.iter().map(|(own, _)| own.clone()).collect();
+        let values: Vec<f64> = reported.iter().map(|own| own.value).collect();
         Some(NamedMechanism {
             id: id.as_str(),
             balance: id.balance().as_str(),
-            statement: sentence(&mechanism.statement(core::slice::from_ref(&reported), &[value])),
+            statement: sentence(&mechanism.statement(&reported, &values)),
             equation: mechanism.equation().to_owned(),
-            parameters: vec![ReportedParameter::new(
-                &reported,
-                with_form(std, &reported, &self.data),
-            )],
+            parameters: figures
+                .iter()
+                .map(|(own, std)| ReportedParameter::new(own, with_form(*std, own, &self.data)))
+                .collect(),
             evidence: Evidence {
-                delta_bic: z * z,
-                // Not measured: the timing is fitted to all runs together.
+                delta_bic,
+                // Not measured: timing and spectrum are of all runs together.
                 holdout_nll_gain_per_sample: 0.0,
-                confidence: surest(self.data.series.len()).min(0.97),
+                confidence: surest(self.data.series.len()).min(0.97).min(most),
             },
             confusable_with: Vec::new(),
             separating_test: String::new(),

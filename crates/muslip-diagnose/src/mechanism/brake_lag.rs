@@ -9,11 +9,14 @@ pub struct BrakeLag;
 
 impl Describe for BrakeLag {
     fn facts(&self) -> Facts {
-        Facts::of(
-            Id::BrakeLag,
-            Stage::Wheel,
-            "time_constant * dT/dt + T = torque_per_pressure * pressure",
-        )
+        Facts {
+            audited: Some(Audited::EarlyBrake),
+            ..Facts::of(
+                Id::BrakeLag,
+                Stage::Wheel,
+                "time_constant * dT/dt + T = torque_per_pressure * pressure",
+            )
+        }
     }
     fn memory_s(&self, p: &[f64], _context: &Context) -> Option<f64> {
         p.first().copied()

@@ -144,6 +144,15 @@ pub struct Fitted<'a, T> {
     pub series: &'a [Series],
 }
 
+/// What the audit shows of a mechanism without a tyre law.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Audited {
+    /// The brake is read before its torque acts.
+    EarlyBrake,
+    /// The drag rings.
+    Ring,
+}
+
 /// What is the same for a form of a mechanism in every campaign.
 #[derive(Clone, Copy, Debug)]
 pub struct Facts {
@@ -165,6 +174,9 @@ pub struct Facts {
     pub finding: Option<Word>,
     /// The speed whose lateness it is: found by the timing of the channels, not among the other mechanisms.
     pub late: Option<Speed>,
+    /// What the audit has that shows it where the decision does not name it: a tyre law, fed with the speeds' noise, is no
+    /// witness of what is faster.
+    pub audited: Option<Audited>,
     /// What the picture of its effect is drawn over, where wheel or vehicle lack it.
     pub drawn_over: Against,
     /// Which parameter is its size, where one is: at its null the mechanism is absent.
@@ -198,6 +210,7 @@ impl Facts {
             channel: balance.channel(),
             finding: None,
             late: None,
+            audited: None,
             drawn_over: Against::Time,
             amplitude: Some(0),
             counter_form: false,

@@ -46,8 +46,8 @@ mod wheel_speed_delay;
 mod zero_drift;
 
 pub use describe::{
-    Against, Describe, Facts, Fitted, Mechanism, Parameter, Reported, Residuals, Search, Speed,
-    Stage,
+    Against, Audited, Describe, Facts, Fitted, Mechanism, Parameter, Reported, Residuals, Search,
+    Speed, Stage,
 };
 pub use guide::{Alias, Compensation, Example, Guide, Kind, Memory, Sign};
 pub use id::Id;

@@ -1,8 +1,8 @@
 //! What the file of a mechanism is written with.
 
 pub use super::describe::{
-    Against, Describe, Facts, Fitted, Mechanism, Parameter, Reported, Residuals, Search, Speed,
-    Stage, above_limit, below_limit,
+    Against, Audited, Describe, Facts, Fitted, Mechanism, Parameter, Reported, Residuals, Search,
+    Speed, Stage, above_limit, below_limit,
 };
 pub use super::guide::{Alias, Compensation, Example, Guide, Kind, Memory, Sign, runs};
 pub use super::id::Id;

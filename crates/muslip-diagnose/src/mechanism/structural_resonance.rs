@@ -40,6 +40,7 @@ impl Describe for StructuralResonance {
             form,
             amplitude,
             filters: true,
+            audited: (self.form == Form::Whole).then_some(Audited::Ring),
             ..Facts::of(Id::StructuralResonance, Stage::Structure, equation)
         }
     }
