@@ -12,6 +12,7 @@ use crate::constants::{
 use crate::decide::{Claim, Trial, rivals, softness, undisputed};
 use crate::figures::{figures, stds_from_none, with_form};
 use crate::innovations::dependence::Dependence;
+use crate::innovations::hypothesis::Judged;
 use crate::mechanism::{Audited, Balance, Id, Reported, Speed};
 use crate::number::finite_or_zero;
 use crate::outcome::{
@@ -116,15 +117,15 @@ impl Answer<'_> {
     /// likely: there each is said that has a figure.
     pub(super) fn not_said(&self) -> Vec<Unsaid> {
         let few = surest(self.data.series.len()) < FEW_RUNS_SURE;
-        let terms = self.decision.chosen.model.terms.iter().enumerate();
-        let not_said = terms.filter_map(|(place, term)| {
-            let (_, sure) = self.sureness(term.entry)?;
+        let terms = self.decision.chosen.model.terms.iter();
+        let not_said = terms.filter_map(|term| {
+            let (taken_up, sure) = self.sureness(term.entry)?;
             let aliases = self.data.catalogue.get(term.entry).id().aliases();
             let of_alias =
                 |other: &&Alternative| aliases.iter().any(|a| a.with.as_str() == other.id);
             let aliases = sure.others.iter().filter(of_alias).map(|o| o.confidence);
             let tied = tied(sure.share, aliases) / sure.share.max(1e-9);
-            let why = if !self.has_a_figure(place) {
+            let why = if !self.has_a_figure(term.entry, &taken_up.judged) {
                 Why::NoFigure
             } else if few || likely(sure.confidence, tied) {
                 return None;
@@ -139,11 +140,15 @@ impl Answer<'_> {
         not_said.collect()
     }
 
-    /// Whether a figure of a term is told from what it would be without the term.
-    fn has_a_figure(&self, place: usize) -> bool {
-        let chosen = &self.decision.chosen;
-        let covariance = self.covariance(chosen);
-        let figures = figures(&self.data, &chosen.model, &covariance, place);
+    /// Whether a figure of a name is told from what it would be without it, where the name was taken up: a free dependence that
+    /// was taken up since may span it.
+    fn has_a_figure(&self, entry: usize, taken_up: &Judged) -> bool {
+        let mut terms = taken_up.model.terms.iter();
+        let Some(place) = terms.position(|term| term.entry == entry) else {
+            return true;
+        };
+        let covariance = self.covariance(taken_up);
+        let figures = figures(&self.data, &taken_up.model, &covariance, place);
         let told = |(own, std): &(Reported<f64>, f64)| {
             stds_from_none(own, *std, &self.data) > LEAST_STDS_OF_FIGURE
         };
