@@ -319,22 +319,20 @@ pub fn ring(runs: &[Recording], hum_hz: Option<f64>) -> Option<Ring> {
     }
     let lines: Vec<f64> = MAINS_HZ.into_iter().chain(hum_hz).collect();
     let fastest = RING_FASTEST * 2.0 * first_hz * spectra[0].power.len() as f64;
-    let mut tried: Vec<(f64, f64, f64)> = Vec::new();
+    let mut tried: Vec<(f64, Vec<f64>, (f64, f64))> = Vec::new();
     let mut frequency = RING_SLOWEST_HZ;
     while frequency < fastest {
         let wide = |damping: &f64| is_wide(frequency, *damping, first_hz);
         for damping in DAMPINGS.into_iter().filter(wide) {
-            let beside = Beside::new(&spectra, first_hz, &lines, (frequency, damping), BAND);
-            if let Some(beside) = beside {
-                let sum = beside.gains(&spectra).iter().sum();
-                tried.push((sum, frequency, damping));
+            let at = (frequency, damping);
+            if let Some(beside) = Beside::new(&spectra, first_hz, &lines, at, BAND) {
+                let gains = beside.gains(&spectra);
+                tried.push((gains.iter().sum(), gains, at));
             }
         }
         frequency *= FREQUENCY_STEP;
     }
-    let (gain, frequency, damping) = tried.into_iter().max_by(|a, b| a.0.total_cmp(&b.0))?;
-    let at = (frequency, damping);
-    let gains = Beside::new(&spectra, first_hz, &lines, at, BAND)?.gains(&spectra);
+    let (gain, gains, at) = tried.into_iter().max_by(|a, b| a.0.total_cmp(&b.0))?;
     if gain < RING_LEAST_NATS || !are_alike(&gains) {
         return None;
     }
