@@ -42,8 +42,8 @@ enum Shape {
     Hats {
         /// Their knots.
         knots: Vec<f64>,
-        /// The knot at which a dependence of the law is nothing: its own parameters hold there. The fullest one.
-        reference: Option<usize>,
+        /// The knots at which it is nothing, for the law's own parameters hold there, in their order.
+        held: Vec<usize>,
     },
     /// A wave once a turn of the wheel, for each run from an angle of its own: where the wheel stood at the start is not
     /// known. Of the brake's torque, for it is a disc or a drum that turns.
@@ -80,24 +80,71 @@ fn knots(data: &Data, values: &[Vec<f64>], balance: Balance, count: usize) -> Ve
     }
 }
 
-/// The knot that most samples of the tyre's balance are about: beside one that nothing is known of, the law could be
-/// anything. Along the slip a wheel that stands says nothing.
-fn fullest(data: &Data, values: &[Vec<f64>], action: Action, knots: &[f64]) -> usize {
-    let along_slip = matches!(action, Action::CriticalSlip | Action::Slip);
+/// How much of the tyre's balance is about each knot, by what a sample counts.
+fn about(
+    data: &Data,
+    values: &[Vec<f64>],
+    knots: &[f64],
+    counts: impl Fn(&Series, usize) -> f64,
+) -> Vec<f64> {
     let mut about = vec![0.0; knots.len()];
     for (s, u) in data.series.iter().zip(values) {
-        let used = s.segments(Balance::Tyre).iter().flat_map(Clone::clone);
-        for k in used.filter(|k| s.rolling[*k] || !along_slip) {
+        for k in s.segments(Balance::Tyre).iter().flat_map(Clone::clone) {
             if let Some((at, w)) = hat(knots, u[k]) {
-                about[at] += 1.0 - w;
+                let count = finite_or_zero(counts(s, k));
+                about[at] += (1.0 - w) * count;
                 if let Some(next) = about.get_mut(at + 1) {
-                    *next += w;
+                    *next += w * count;
                 }
             }
         }
     }
-    let fullest = (0..knots.len()).max_by(|a, b| about[*a].total_cmp(&about[*b]));
-    fullest.unwrap_or(0)
+    about
+}
+
+/// The knot that most is about.
+fn fullest(about: &[f64]) -> usize {
+    let all = 0..about.len();
+    all.max_by(|a, b| about[*a].total_cmp(&about[*b]))
+        .unwrap_or(0)
+}
+
+/// The knots at which a dependence of the tyre's balance is nothing, in their order: beside one that nothing is known of, the
+/// law could be anything.
+///
+/// Along the slip it is another curve: there the law's peak and the slip of it hold at a knot each, where they matter most, or
+/// its form makes up for any of the two. A law twice as steep with half the friction at its beginning is the same curve, but
+/// not to the chain's nuisances.
+fn held(
+    data: &Data,
+    variable: &Variable,
+    values: &[Vec<f64>],
+    action: Action,
+    knots: &[f64],
+) -> Vec<usize> {
+    if *variable == Variable::Slip {
+        let [peak, slip] = [0, 1].map(|parameter| {
+            about(data, values, knots, |s, k| {
+                let x = s.slip(k, data.context.radius) / data.context.nominal[1];
+                let bottom = 1.0 + x * x;
+                // By how much the law changes with the logarithm of either, but for a factor.
+                [x / bottom, x * (1.0 - x * x) / (bottom * bottom)][parameter].powi(2)
+            })
+        });
+        let first = fullest(&peak);
+        let mut slip = slip;
+        slip[first] = -1.0;
+        let mut held = vec![first, fullest(&slip)];
+        held.sort_unstable();
+        return held;
+    }
+    if action == Action::Force {
+        return Vec::new();
+    }
+    // Along the slip a wheel that stands says nothing.
+    let along_slip = matches!(action, Action::CriticalSlip | Action::Slip);
+    let counts = |s: &Series, k: usize| f64::from(s.rolling[k] || !along_slip);
+    vec![fullest(&about(data, values, knots, counts))]
 }
 
 /// All dependences that a campaign can show.
@@ -140,15 +187,17 @@ fn on(data: &Data, variable: &Variable) -> Vec<Dependence> {
             .into_iter()
             .flat_map(|a| shapes.iter().map(move |k| (a, k)))
         {
-            let reference =
-                (action != Action::Force).then(|| fullest(data, &values, action, knots));
+            let held = match balance {
+                Balance::Tyre => held(data, variable, &values, action, knots),
+                Balance::Wheel | Balance::Vehicle => Vec::new(),
+            };
             out.push(Dependence {
                 balance,
                 variable: variable.clone(),
                 action,
                 shape: Shape::Hats {
                     knots: knots.clone(),
-                    reference,
+                    held,
                 },
                 values: Arc::clone(&values),
             });
@@ -221,7 +270,7 @@ impl Dependence {
     #[must_use]
     pub fn width(&self) -> usize {
         match &self.shape {
-            Shape::Hats { knots, reference } => knots.len() - usize::from(reference.is_some()),
+            Shape::Hats { knots, held } => knots.len() - held.len(),
             Shape::Wave { runs } => 2 * runs.len(),
         }
     }
@@ -237,7 +286,7 @@ impl Dependence {
     #[must_use]
     pub fn columns(&self, data: &Data, levers: &Levers, run: usize) -> Vec<Triple> {
         match &self.shape {
-            Shape::Hats { knots, reference } => self.of_hats(data, levers, run, knots, *reference),
+            Shape::Hats { knots, held } => self.of_hats(data, levers, run, knots, held),
             Shape::Wave { runs } => self.of_wave(data, runs, run),
         }
     }
@@ -248,7 +297,7 @@ impl Dependence {
         levers: &Levers,
         run: usize,
         knots: &[f64],
-        reference: Option<usize>,
+        held: &[usize],
     ) -> Vec<Triple> {
         let (s, u) = (&data.series[run], &self.values[run]);
         let hats: Vec<Option<(usize, f64)>> = u.iter().map(|u| hat(knots, *u)).collect();
@@ -261,7 +310,7 @@ impl Dependence {
         let arm = if of_wheel { data.context.radius } else { 1.0 };
         let acting = arm * data.context.mean_load;
         (0..knots.len())
-            .filter(|c| reference != Some(*c))
+            .filter(|c| !held.contains(c))
             .map(|c| match self.balance {
                 Balance::Tyre => {
                     let added = |k: usize| -height(c, k) * levers.of(data, self.action, run, k);
@@ -299,12 +348,12 @@ impl Dependence {
     /// The correction of a repaired model, from the columns' coefficients; none for what is no function of the variable.
     #[must_use]
     pub fn correction(&self, data: &Data, coefficients: &[f64]) -> Option<Correction> {
-        let Shape::Hats { knots, reference } = &self.shape else {
+        let Shape::Hats { knots, held } = &self.shape else {
             return None;
         };
         let mut values = coefficients.to_vec();
-        if let Some(reference) = reference {
-            values.insert(*reference, 0.0);
+        for knot in held {
+            values.insert(*knot, 0.0);
         }
         Some(Correction {
             variable: self.variable.key(data),
@@ -354,6 +403,45 @@ mod tests {
         for k in 0..before.len() {
             let off = after[k] - before[k] - by(k);
             assert!(off.abs() < 1e-9 * largest, "{k}: {off} of {largest}");
+        }
+    }
+
+    #[test]
+    fn a_dependence_along_the_curve_leaves_the_law_its_peak_and_the_slip_of_it() {
+        let data = stop(Noise::TYPICAL, 4);
+        let levers = Levers::new(&data, &Model::of_law(PEAK, CRITICAL));
+        let blocks = &data.blocks[0][Balance::Tyre as usize];
+        // Least share of what a mixture of both changes of the law is, that the dependence's columns do not make.
+        let left = |own: &Dependence| {
+            let columns = own.columns(&data, &levers, 0);
+            let columns: Vec<Vec<f64>> = columns.iter().map(|c| blocks.mean(&c[0])).collect();
+            let of =
+                |c: &[Vec<f64>]| nalgebra::DMatrix::from_fn(c[0].len(), c.len(), |k, i| c[i][k]);
+            let mut law = of(&[&levers.force, &levers.critical].map(|c| blocks.mean(&c[0])));
+            for mut column in law.column_iter_mut() {
+                column.normalize_mut();
+            }
+            let all = of(&columns);
+            let products = all.transpose() * &all;
+            let fitted = products.pseudo_inverse(1e-9).unwrap() * (all.transpose() * &law);
+            let rest = &law - &all * fitted;
+            let [whole, rest] = [&law, &rest].map(|x| x.transpose() * x);
+            let root = whole.cholesky().unwrap().inverse();
+            (root * rest).eigenvalues().unwrap().min()
+        };
+        let of_tyre = |variable: Variable| {
+            let all = on(&data, &variable).into_iter();
+            all.filter(|own| own.balance == Balance::Tyre)
+                .collect::<Vec<_>>()
+        };
+        let along = of_tyre(Variable::Slip);
+        assert_eq!(along.len(), 2);
+        for own in &along {
+            let left = left(own);
+            assert!(left > 0.03, "{:?}: {left}", own.action);
+            let told = own.correction(&data, &vec![1.0; own.width()]).unwrap();
+            let nothing = told.values.iter().filter(|value| **value == 0.0).count();
+            assert_eq!((nothing, told.values.len()), (2, told.knots.len()));
         }
     }
 
