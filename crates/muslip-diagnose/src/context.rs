@@ -49,6 +49,9 @@ pub struct Context {
     pub slip_sigma: f64,
     /// Largest drag reading (99.9th percentile) in N.
     pub max_drag: f64,
+    /// Whether the drag varies once a revolution as a ripple of the wheel speed would have it, and its reading hardly does.
+    #[serde(skip)]
+    pub ripple_unread: bool,
     /// Factor by which the smoothing windows are widened.
     pub reach_factor: f64,
     /// Work before each run in J and clock offset of each run in s, by position.

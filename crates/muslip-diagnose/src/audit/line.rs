@@ -1,6 +1,12 @@
 //! Ripple of the wheel speed: lines over the wheel's angle.
 
-use super::constants::{CALM, ORDERS, RIPPLE_RATIO, ROLLING_SHARE, SMOOTH_S};
+use core::f64::consts::TAU;
+
+use nalgebra::{SMatrix, SVector};
+
+use super::constants::{
+    CALM, FEWEST_TURNED, ORDERS, READ_SHARE, RIPPLE_RATIO, ROLLING_SHARE, SMOOTH_S, TOLD_SIGMAS,
+};
 use super::finding::{Finding, Word};
 use super::recording::Recording;
 use super::signal::Signal;
@@ -109,9 +115,24 @@ fn high_passed(values: &[f64], reach: usize) -> Vec<f64> {
         .collect()
 }
 
-/// Squared amplitude of the wheel speed's relative ripple of an order in each stretch, by what the drag leaves beside the
-/// law, and the weight of each.
-fn ripples(left: &[Stretch], rests: &[Vec<f64>], order: f64, reach: usize) -> Vec<(f64, f64)> {
+/// A relative ripple of the wheel speed in one stretch.
+#[derive(Clone, Copy, Debug, Default)]
+struct Amplitude {
+    cos: f64,
+    sin: f64,
+    /// What the stretch counts.
+    weight: f64,
+}
+
+impl Amplitude {
+    /// Its square.
+    fn power(self) -> f64 {
+        self.cos * self.cos + self.sin * self.sin
+    }
+}
+
+/// The wheel speed's relative ripple of an order in each stretch, by what the drag leaves beside the law.
+fn ripples(left: &[Stretch], rests: &[Vec<f64>], order: f64, reach: usize) -> Vec<Amplitude> {
     left.iter()
         .zip(rests)
         .map(|(stretch, rest)| {
@@ -133,10 +154,14 @@ fn ripples(left: &[Stretch], rests: &[Vec<f64>], order: f64, reach: usize) -> Ve
             let (cx, sx) = (dot(&c, rest), dot(&s, rest));
             let det = cc * ss - cs * cs;
             if !(det > 1e-6 * cc * ss) {
-                return (0.0, 0.0);
+                return Amplitude::default();
             }
-            let (a, b) = ((ss * cx - cs * sx) / det, (cc * sx - cs * cx) / det);
-            (a * a + b * b, 0.5 * (cc + ss))
+            // What is read too fast is taken for a smaller slip: the law has it brake too little, and leaves the opposite.
+            Amplitude {
+                cos: -(ss * cx - cs * sx) / det,
+                sin: -(cc * sx - cs * cx) / det,
+                weight: 0.5 * (cc + ss),
+            }
         })
         .collect()
 }
@@ -159,7 +184,7 @@ pub fn locked(left: &[Stretch], step: f64) -> f64 {
     let explained = |order: f64| -> f64 {
         ripples(&forced, &rests, order, reach)
             .iter()
-            .map(|(power, weight)| power * weight)
+            .map(|own| own.power() * own.weight)
             .sum::<f64>()
     };
     // Less what lies beside: noise has some everywhere.
@@ -172,18 +197,88 @@ pub fn locked(left: &[Stretch], step: f64) -> f64 {
         / rows.max(1) as f64
 }
 
-/// An order with its power, the power beside it, and its stretches' powers and weights.
-type Order = (usize, f64, f64, Vec<(f64, f64)>);
+/// Turns of the wheel that one piece of a stretch is read over.
+const TURNS: f64 = 3.0;
+/// Fewest readings of such a piece, and the share of its turns that they have to span.
+const FEWEST_READINGS: usize = 18;
+const MOST_OF_PIECE: f64 = 0.8;
+/// A stretch shows a ripple of so many times the power that its noise has there.
+const TOLD_POWERS: f64 = 8.0;
+
+/// By how much of a ripple that the law's slip shows the wheel speed itself varies, in pieces of a few turns of the stretches
+/// that show it: in phase, and a quarter of a turn later.
+fn shares_read(
+    left: &[Stretch],
+    of_law: &[Amplitude],
+    order: f64,
+    shows: impl Fn(&Amplitude) -> bool,
+) -> [Vec<f64>; 2] {
+    let mut shares = [Vec::new(), Vec::new()];
+    for (stretch, own) in left.iter().zip(of_law).filter(|(_, own)| shows(own)) {
+        let turn = |k: &usize| (stretch.angle[*k] / (TAU * TURNS)) as i64;
+        let all: Vec<usize> = (0..stretch.angle.len()).collect();
+        for piece in all.chunk_by(|a, b| turn(a) == turn(b)) {
+            let turned = stretch.angle[piece[piece.len() - 1]] - stretch.angle[piece[0]];
+            if piece.len() < FEWEST_READINGS || turned < MOST_OF_PIECE * TAU * TURNS {
+                continue;
+            }
+            if let Some([cos, sin]) = read_in(stretch, piece, order) {
+                shares[0].push((own.cos * cos + own.sin * sin) / own.power());
+                shares[1].push((own.cos * sin - own.sin * cos) / own.power());
+            }
+        }
+    }
+    shares
+}
+
+/// Cosine and sine of the wheel speed's relative ripple in a piece of a stretch, beside a cubic and under a window.
+fn read_in(stretch: &Stretch, piece: &[usize], order: f64) -> Option<[f64; 2]> {
+    const WIDTH: usize = 6;
+    let mut products = SMatrix::<f64, WIDTH, WIDTH>::zeros();
+    let mut right = SVector::<f64, WIDTH>::zeros();
+    for (i, &k) in piece.iter().enumerate() {
+        let at = (i as f64 + 0.5) / piece.len() as f64;
+        let x = 2.0 * at - 1.0;
+        let (sin, cos) = (order * stretch.angle[k]).sin_cos();
+        let row = SVector::from([1.0, x, x * x, x * x * x, cos, sin]);
+        let weight = (core::f64::consts::PI * at).sin().powi(4);
+        products += weight * row * row.transpose();
+        right += weight * stretch.omega[k].max(1e-3).ln() * row;
+    }
+    let solved = products.cholesky()?.solve(&right);
+    Some([solved[4], solved[5]]).filter(|own| own.iter().all(|x| x.is_finite()))
+}
+
+/// Whether so many shares are hardly any, in the middle: neither of one sign nor of the other.
+fn hardly_any(shares: &mut [f64]) -> bool {
+    let middle = median_in_place(shares);
+    let mut apart: Vec<f64> = shares.iter().map(|x| (x - middle).abs()).collect();
+    // Of a normal distribution the median deviation is 0.67 of the standard one; a median spreads by a quarter more than a
+    // mean.
+    let std = 1.25 * 1.48 * median_in_place(&mut apart) / (shares.len() as f64).sqrt();
+    shares.len() >= FEWEST_TURNED && middle.abs() + TOLD_SIGMAS * std < READ_SHARE
+}
+
+/// What the law's slip shows of a ripple.
+pub struct OfLaw {
+    /// Ripple of the wheel speed; nothing where its reading hardly varies so.
+    pub ripple: Option<Finding>,
+    /// Whether it is one once a revolution that the reading hardly has.
+    pub unread: bool,
+}
+
+/// An order with its power, the power beside it, and its stretches' amplitudes.
+type Order = (usize, f64, f64, Vec<Amplitude>);
 
 /// Ripple of the wheel speed by what it makes of the law's slip: also while the brake works.
 #[must_use]
-pub fn ripple_of_law(left: &[Stretch], step: f64) -> Option<Finding> {
+pub fn ripple_of_law(left: &[Stretch], step: f64) -> Option<OfLaw> {
     let reach = (0.5 * SMOOTH_S / step).ceil() as usize;
     let rests: Vec<Vec<f64>> = left.iter().map(|s| high_passed(&s.law, reach)).collect();
     let hz = left.iter().map(|s| s.hz).fold(0.0, f64::max);
-    let mean = |parts: &[(f64, f64)]| {
-        let weight: f64 = parts.iter().map(|p| p.1).sum();
-        parts.iter().map(|p| p.0 * p.1).sum::<f64>() / weight.max(1e-300)
+    let mean = |parts: &[Amplitude]| {
+        let weight: f64 = parts.iter().map(|p| p.weight).sum();
+        parts.iter().map(|p| p.power() * p.weight).sum::<f64>() / weight.max(1e-300)
     };
     // What white residuals give: no order is looked at beside that has less.
     let squares = |x: &[f64]| x.iter().map(|x| x * x).sum::<f64>();
@@ -217,20 +312,34 @@ pub fn ripple_of_law(left: &[Stretch], step: f64) -> Option<Finding> {
     }
     let (order, power, floor, parts) = best?;
     let value = (power - floor).sqrt();
-    let weight: f64 = parts.iter().map(|p| p.1).sum();
+    let weight: f64 = parts.iter().map(|p| p.weight).sum();
     // Left out in turn, each stretch by its weight.
     let spread = parts
         .iter()
-        .map(|p| (p.1 / weight * (p.0 - power)).powi(2))
+        .map(|p| (p.weight / weight * (p.power() - power)).powi(2))
         .sum::<f64>()
         .sqrt();
     let std = (0.5 * spread / value).max(0.03 * value);
-    let several = parts.iter().filter(|p| p.0 > 0.25 * power).count();
-    (value > 4.0 * std && several >= 2).then(|| {
+    let shown = 0.25 * power;
+    let several = parts.iter().filter(|p| p.power() > shown).count();
+    if !(value > 4.0 * std && several >= 2) {
+        return None;
+    }
+    // In a stretch near the peak the law says nothing of the slip, and noise looks like a ripple.
+    let shows = |own: &Amplitude| {
+        own.power() > f64::max(shown, TOLD_POWERS * 2.0 * variance / own.weight.max(1e-300))
+    };
+    let mut shares = shares_read(left, &parts, order as f64, shows);
+    let unread = shares.iter_mut().all(|own| hardly_any(own));
+    let said = || {
         Finding::of("wheel_speed_rad_s", Word::Ripple, (value, std), "1").saying(format!(
             "The wheel speed varies by {:.2} % {order} times a revolution.",
             100.0 * value
         ))
+    };
+    Some(OfLaw {
+        ripple: (!unread).then(said),
+        unread: unread && order == 1,
     })
 }
 

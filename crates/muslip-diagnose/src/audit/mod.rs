@@ -67,6 +67,8 @@ pub struct Audit {
     pub timings: Timings,
     /// Slow noise of the vehicle speed.
     pub vehicle_colour: Option<Colour>,
+    /// Whether the drag varies once a revolution as a ripple of the wheel speed would have it, and its reading hardly does.
+    pub ripple_unread: bool,
     /// A ring of the drag.
     pub ring: Option<Ring>,
     /// A hum of the drag that stands out of its noise.
@@ -162,29 +164,33 @@ const DRAG_STEP_S: f64 = 0.005;
 /// Step of the grid for ripple, s: a few of it a tooth of a commutator.
 const RIPPLE_STEP_S: f64 = 0.002;
 
-/// What shows beside the tyre's law: ripple, zero, slow noise of the drag.
+/// What shows beside the tyre's law: ripple, zero, slow noise of the drag; and whether the wheel speed's reading hardly has that
+/// ripple.
 fn of_tyre(
     rig: &Rig,
     timings: &Timings,
     recordings: &[Recording],
     found: &[Finding],
-) -> Vec<Finding> {
+) -> (Vec<Finding>, bool) {
     let has = |word: Word| found.iter().any(|f| f.finding == word);
     let mut out = Vec::new();
     let step = timing::median_of(recordings, |run| run.step);
     let fitted = tyre::fitted(rig, recordings, timings);
-    let ripple = fitted
-        .as_ref()
-        .and_then(|fitted| {
-            let step = step.max(RIPPLE_STEP_S);
-            line::ripple_of_law(&fitted.left(recordings, step), step)
-        })
-        .or_else(|| line::ripple(recordings));
+    let of_law = fitted.as_ref().and_then(|fitted| {
+        let step = step.max(RIPPLE_STEP_S);
+        line::ripple_of_law(&fitted.left(recordings, step), step)
+    });
+    let unread = of_law.as_ref().is_some_and(|of_law| of_law.unread);
+    let line = of_law.is_some();
+    let ripple = match of_law {
+        Some(of_law) => of_law.ripple,
+        None => line::ripple(recordings),
+    };
     let zero = still::zero(recordings);
     let Some(fitted) = fitted else {
         out.extend(ripple);
         out.extend(zero);
-        return out;
+        return (out, unread);
     };
     let step = step.max(DRAG_STEP_S);
     let left = fitted.left(recordings, step);
@@ -205,11 +211,11 @@ fn of_tyre(
         ]
         .into_iter()
         .any(has);
-    if !other && ripple.is_none() {
+    if !other && !line && ripple.is_none() {
         out.extend(colour::of_drag(&left, step));
     }
     out.extend(ripple);
-    out
+    (out, unread)
 }
 
 /// Audits the measuring chain of a campaign.
@@ -232,13 +238,14 @@ pub fn audit(rig: &Rig, runs: &[Run]) -> Audit {
     findings.extend(filter::filters(&timings, &recordings));
     let (of_speeds, vehicle_colour) = of_speeds(rig, &timings, &recordings);
     findings.extend(of_speeds);
-    let more = of_tyre(rig, &timings, &recordings, &findings);
+    let (more, ripple_unread) = of_tyre(rig, &timings, &recordings, &findings);
     findings.extend(more);
     Audit {
         wheel_late: timings.wheel,
         vehicle_late: timings.vehicle,
         brake_late: timings.brake,
         vehicle_colour,
+        ripple_unread,
         ring: ring::ring(&recordings, hum.as_ref().map(|hum| hum.frequency_hz)),
         loud_hum: hum.filter(|hum| hum.share > HUM_BEYOND_NOISE),
         findings,
@@ -363,6 +370,48 @@ mod tests {
         assert!((filtered.value - 0.03).abs() < 2e-3, "{filtered:?}");
         let delayed = changed(|drag| [&[drag[0]; 30], &drag[..drag.len() - 30]].concat());
         assert!(delayed.is_none(), "{delayed:?}");
+    }
+
+    #[test]
+    fn a_radius_that_varies_is_told_from_a_rippling_encoder_by_what_the_wheel_speed_reads() {
+        let ripple = 0.008;
+        let turned = |of_radius: bool| {
+            [0.0, 1.0, 2.0].map(|phase| {
+                let mut run = run(phase, 0.0, 0.0);
+                let mut angle = phase;
+                for k in 0..run.time_s.len() {
+                    let (omega, v) = (run.wheel_speed_rad_s[k], run.vehicle_speed_m_s[k]);
+                    angle += 1e-3 * omega;
+                    let change = ripple * angle.cos();
+                    if of_radius {
+                        // The wheel is held to its speed: the drag is that of the slip of a larger or smaller wheel.
+                        let drag = |slip: f64| {
+                            let u = slip / 0.12;
+                            0.3 * 3500.0 * 0.9 * 2.0 * u / (1.0 + u * u)
+                        };
+                        let slip = 1.0 - RADIUS * omega / v;
+                        run.drag_force_n[k] += drag(slip - change * (1.0 - slip)) - drag(slip);
+                    } else {
+                        run.wheel_speed_rad_s[k] *= 1.0 + change;
+                    }
+                }
+                run
+            })
+        };
+        let encoder = audit(&rig(), &turned(false));
+        assert!(!encoder.ripple_unread);
+        let mut ripples = encoder
+            .findings
+            .iter()
+            .filter(|f| f.finding == Word::Ripple);
+        let value = ripples.next().unwrap().value;
+        assert!((value - ripple).abs() < 1e-3, "{value}");
+        let radius = audit(&rig(), &turned(true));
+        assert!(radius.ripple_unread, "{:?}", radius.findings);
+        // Nor is what turns with the wheel slow noise of the drag.
+        let told = |word| radius.findings.iter().any(|f| f.finding == word);
+        let neither = !told(Word::Ripple) && !told(Word::ColouredNoise);
+        assert!(neither, "{:?}", radius.findings);
     }
 
     #[test]

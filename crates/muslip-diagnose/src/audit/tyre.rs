@@ -44,6 +44,8 @@ pub struct Stretch {
     pub slope: Vec<f64>,
     /// The wheel's angle, rad.
     pub angle: Vec<f64>,
+    /// Its speed as read, rad/s; two readings more than the rest.
+    pub omega: Vec<f64>,
     /// Mean turns a second.
     pub hz: f64,
 }
@@ -171,6 +173,7 @@ impl Fitted {
                         })
                         .collect(),
                     hz: omega.iter().sum::<f64>() / omega.len() as f64 / core::f64::consts::TAU,
+                    omega,
                 });
             }
         }

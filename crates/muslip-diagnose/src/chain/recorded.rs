@@ -124,6 +124,7 @@ impl<'a> Recorded<'a> {
         data.vehicle_late = late.vehicle;
         data.vehicle_colour = self.audit.vehicle_colour;
         data.vehicle_filtered = self.audit.vehicle_filtered();
+        data.context.ripple_unread = self.audit.ripple_unread;
         data
     }
 

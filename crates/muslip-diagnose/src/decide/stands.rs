@@ -142,14 +142,10 @@ pub fn needed(trial: &Trial) -> bool {
 fn seen_at_sensors(trial: &Trial) -> bool {
     let (sum, t) = trial.at_sensors;
     if trial.mechanism().is_some() {
-        // Runs that differ at random do not line up to leave so little of their differences.
-        let lined_up = trial.unanimous[1]
-            && trial.gain > 0.0
-            && lowers_drag_s_error(trial.predicts, LINED_UP_PREDICTED);
         let large = sum > LARGE_GAIN_AT_SENSORS && t > LEAST_T_OF_LARGE;
         let plain = trial.gain > 0.0 && t > LEAST_T_AT_SENSORS_NOT_FED;
         let alike = t > LEAST_T_AT_SENSORS || !trial.fed_by_chain && (large || plain);
-        return sum > LEAST_GAIN_AT_SENSORS && (alike || lined_up);
+        return sum > LEAST_GAIN_AT_SENSORS && (alike || lined_up(trial));
     }
     trial.predicts > LEAST_PREDICTED_BY_DEPENDENCE && dependence_at_sensors(trial)
 }
@@ -193,9 +189,9 @@ fn seen_on_unseen_runs(trial: &Trial) -> bool {
                 LEAST_T
             };
             let several = trial.runs >= FEWEST_RUNS_AGREED;
-            let few_reach =
+            let of_few =
                 trial.unanimous[0] && (clearly || large && several) || several && undisputed(trial);
-            mean > 0.0 && (t >= least || few_reach)
+            mean > 0.0 && (t >= least || of_few)
         }
         // What says nothing of what it is has to be seen at the sensors' noise as well: fitted noise may have left it.
         Claim::Dependence(_) => {
@@ -205,10 +201,22 @@ fn seen_on_unseen_runs(trial: &Trial) -> bool {
     }
 }
 
+/// Whether a name leaves so little of what runs differ by that chance, which has no order, does not do it.
+fn lined_up(trial: &Trial) -> bool {
+    let lowers = lowers_drag_s_error(trial.predicts, LINED_UP_PREDICTED);
+    trial.unanimous[1] && trial.gain > 0.0 && lowers
+}
+
+/// Whether gains are uneven because few of several runs reach what a name is of, which no chain leaves.
+#[must_use]
+pub fn few_reach(trial: &Trial) -> bool {
+    let several = trial.runs >= FEWEST_RUNS_AGREED;
+    undisputed(trial) || several && !trial.fed_by_chain && lined_up(trial)
+}
+
 /// Whether a name that no measuring chain leaves gains much at both levels of the noise, and hardly a run speaks against it:
 /// what few runs reach, a channel's limit, makes gains so uneven that no t shows it.
-#[must_use]
-pub fn undisputed(trial: &Trial) -> bool {
+fn undisputed(trial: &Trial) -> bool {
     let least = LARGE_TO_WORTH * worth(trial);
     let much = trial.gain > least && trial.at_sensors.0 > least;
     much && trial.unanimous == [true; 2] && !trial.fed_by_chain
@@ -283,6 +291,24 @@ mod tests {
             ..few(60.0)
         };
         assert!(!stands(&of_wheel) && !stands(&long));
+    }
+
+    #[test]
+    fn runs_that_line_up_make_a_name_stand_whose_gains_are_uneven() {
+        let data = stop(Noise::TYPICAL, 4);
+        let base = toy::settled(&data);
+        let trial = |predicts: f64, against: bool| Trial {
+            gain: 10.0,
+            at_sensors: (60.0, 1.2),
+            first: true,
+            predicts,
+            unanimous: [false, !against],
+            ..of_name(&data, &base, Id::EffectiveRadius, 5.0, 1.3)
+        };
+        // To less than a half of the drag's mean square error, and hardly a run against it.
+        assert!(stands(&trial(0.75, false)) && few_reach(&trial(0.75, false)));
+        assert!(!stands(&trial(0.65, false)) && !few_reach(&trial(0.65, false)));
+        assert!(!stands(&trial(0.75, true)));
     }
 
     #[test]

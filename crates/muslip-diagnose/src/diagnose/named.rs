@@ -9,7 +9,7 @@ use crate::constants::{
     LEAST_CONFIDENCE, LEAST_DELAY_S, LEAST_PREDICTED, LEAST_STDS_OF_FIGURE, LEAST_T_NOT_FED,
     PREDICTED_APART, RARE_SHARE, SURE_DELAY, TIED, UNKNOWN_STDS, VAGUE_DELAY_S,
 };
-use crate::decide::{Claim, Trial, rivals, softness, undisputed};
+use crate::decide::{Claim, Trial, few_reach, rivals, softness};
 use crate::figures::{figures, stds_from_none, with_form};
 use crate::innovations::dependence::Dependence;
 use crate::innovations::hypothesis::Judged;
@@ -92,14 +92,14 @@ impl Answer<'_> {
         let mechanism = self.data.catalogue.get(entry);
         let (share, others) = beside_double(
             shares(trial, round),
-            mechanism.rare_double(&self.data.series),
+            mechanism.rare_double(&self.data.series, &self.data.context),
         );
         let most = if trial.predicts > LEAST_PREDICTED {
             1.0
         } else {
             DOUBTED
         };
-        let steadiness = if undisputed(trial) {
+        let steadiness = if few_reach(trial) {
             trial.steadiness().max(LEAST_T_NOT_FED)
         } else {
             trial.steadiness()
@@ -152,7 +152,16 @@ impl Answer<'_> {
         let told = |(own, std): &(Reported<f64>, f64)| {
             stds_from_none(own, *std, &self.data) > LEAST_STDS_OF_FIGURE
         };
-        figures.iter().any(told)
+        let parameters = &taken_up.model.terms[place].parameters;
+        let before = &taken_up.model.terms[..place];
+        let before = before.iter().map(|term| term.parameters.len());
+        let first = taken_up.model.base.len() + before.sum::<usize>();
+        let by_no_figure = self.data.catalogue.get(entry).by_no_figure();
+        let varies = |own: &usize| {
+            let std = covariance[(first + own, first + own)].sqrt();
+            std > 0.0 && parameters[*own].abs() > LEAST_STDS_OF_FIGURE * std
+        };
+        figures.iter().any(told) || by_no_figure.iter().any(varies)
     }
 
     /// What no name accounts for: dependences of the chosen model, the one that is left beside it, and a hum that stands

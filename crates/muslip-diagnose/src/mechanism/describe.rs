@@ -286,8 +286,12 @@ pub trait Describe: Send + Sync {
     fn says_as_well(&self, _parameters: &[f64], _context: &Context) -> Option<Id> {
         None
     }
+    /// Parameters that no figure tells and are nothing at zero: by what it varies about the figure, which is its mean.
+    fn by_no_figure(&self) -> &'static [usize] {
+        &[]
+    }
     /// Another mechanism, rare beside it, that nothing in these recordings tells from it.
-    fn rare_double(&self, _series: &[Series]) -> Option<Id> {
+    fn rare_double(&self, _series: &[Series], _context: &Context) -> Option<Id> {
         None
     }
     /// Whether it goes by the order of the campaign's runs: a recording whose place in it is not known is predicted

@@ -49,6 +49,12 @@ impl Describe for EffectiveRadius {
         }
         all
     }
+    fn by_no_figure(&self) -> &'static [usize] {
+        match self.form {
+            Form::Constant => &[],
+            Form::Load | Form::Speed => &[1],
+        }
+    }
     fn statement(&self, reported: &[Reported<f64>], p: &[f64]) -> String {
         format!(
             "the wheel rolls on a radius of {:.5} m{}",
@@ -106,5 +112,25 @@ impl<T: Number> Mechanism<T> for EffectiveRadius {
             "m",
             (p[0] + 1.0) * fitted.context.radius,
         )]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_the_radius_varies_by_is_told_by_no_figure() {
+        let of = |form| EffectiveRadius { form };
+        let context = Context::default();
+        for form in FORMS {
+            let all = of(form).parameters(&context);
+            let told = of(form).by_no_figure();
+            assert_eq!(told.len() + 1, all.len(), "the first is the figure");
+            assert!(
+                told.iter()
+                    .all(|own| all[*own].low < 0.0 && all[*own].high > 0.0)
+            );
+        }
     }
 }

@@ -1,6 +1,6 @@
 //! The wheel speed reading varies once (or a few times) a revolution.
 
-use super::once_a_turn::{Form, radius_reads_as_ripple};
+use super::once_a_turn::{Form, Varies};
 use super::prelude::*;
 use crate::audit::Word;
 
@@ -32,10 +32,13 @@ impl Describe for EncoderRipple {
         self.form.parameters(context, LIMIT)
     }
     fn starts(&self, search: &Search<'_>) -> Vec<Vec<f64>> {
+        if Varies::of(search.series, search.context) == Varies::Radius {
+            return Vec::new();
+        }
         self.form.starts(search.context)
     }
-    fn rare_double(&self, series: &[Series]) -> Option<Id> {
-        radius_reads_as_ripple(series).then_some(Id::RunOut)
+    fn rare_double(&self, series: &[Series], context: &Context) -> Option<Id> {
+        (Varies::of(series, context) == Varies::Encoder).then_some(Id::RunOut)
     }
     fn statement(&self, reported: &[Reported<f64>], _p: &[f64]) -> String {
         format!(

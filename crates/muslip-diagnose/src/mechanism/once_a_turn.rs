@@ -16,10 +16,28 @@ pub struct Form {
     pub phase_per_run: bool,
 }
 
-/// Whether no brake tells a rolling radius that varies from an encoder that ripples: what acts on the wheel is not known.
-#[must_use]
-pub fn radius_reads_as_ripple(series: &[Series]) -> bool {
-    series.iter().all(|s| s.wheel_balance.is_empty())
+/// What varies where no brake tells a rolling radius from an encoder that ripples, for what acts on the wheel is not known.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Varies {
+    /// Whichever the wheel's balance bears out: there is a brake.
+    Told,
+    /// The encoder, which is common; or a radius that the wheel's speed follows.
+    Encoder,
+    /// The radius: the wheel's speed does not follow.
+    Radius,
+}
+
+impl Varies {
+    #[must_use]
+    pub fn of(series: &[Series], context: &Context) -> Self {
+        if series.iter().any(|s| !s.wheel_balance.is_empty()) {
+            Self::Told
+        } else if context.ripple_unread {
+            Self::Radius
+        } else {
+            Self::Encoder
+        }
+    }
 }
 
 /// Whether the samples resolve so many orders of the wheel's angle.

@@ -1,6 +1,6 @@
 //! Drag varies once (or a few times) a wheel revolution.
 
-use super::once_a_turn::{FORMS, Form, radius_reads_as_ripple};
+use super::once_a_turn::{FORMS, Form, Varies};
 use super::prelude::*;
 
 /// Largest amplitude of an order, as a share of the drag or of the load.
@@ -98,10 +98,16 @@ impl Describe for RunOut {
     }
     fn starts(&self, search: &Search<'_>) -> Vec<Vec<f64>> {
         // The ripple, which is common, is offered instead.
-        if self.of == Of::Radius && radius_reads_as_ripple(search.series) {
+        let varies = Varies::of(search.series, search.context);
+        if self.of == Of::Radius && varies == Varies::Encoder {
             return Vec::new();
         }
         self.form.starts(search.context)
+    }
+    fn rare_double(&self, series: &[Series], context: &Context) -> Option<Id> {
+        // A control that holds what a rippling encoder reads makes the wheel turn unevenly instead.
+        let held = self.of == Of::Radius && Varies::of(series, context) == Varies::Radius;
+        held.then_some(Id::EncoderRipple)
     }
     fn statement(&self, reported: &[Reported<f64>], _p: &[f64]) -> String {
         let percent = 100.0 * reported[0].value;
