@@ -84,6 +84,8 @@ pub struct Trial {
     pub says_as_well: Option<Id>,
     /// Whether a measuring chain leaves what looks like it.
     pub fed_by_chain: bool,
+    /// Whether it is the tyre's.
+    pub of_tyre: bool,
     /// Whether it is a memory: what was before counts.
     pub remembers: bool,
     /// Whether that is as long as a recording can show.
@@ -261,6 +263,8 @@ impl<'a> Before<'a> {
             }),
             // No chain feeds a memory of what was left to be explained because none shows.
             fed_by_chain: fed_by_chain == Some(true) && !of_left,
+            of_tyre: mechanism
+                .is_some_and(|(_, entry)| data.catalogue.get(entry).guide().kind == Kind::Tyre),
             remembers: remembered.is_some(),
             lasts: remembered.as_ref().is_none_or(|memory| memory.lasts),
             outlasts_chain: remembered.is_none_or(|memory| memory.outlasts_chain),
