@@ -24,11 +24,7 @@ fn form_share(figure: &str) -> f64 {
 
 /// A mechanism's figures with their gradient in all parameters of the model.
 fn figures_in<T: Listed>(data: &Data, model: &Model, p: &[T], place: usize) -> Vec<Reported<T>> {
-    let mut at = model.base.len();
-    for term in &model.terms[..place] {
-        at += term.parameters.len();
-    }
-    let own = &p[at..at + model.terms[place].parameters.len()];
+    let own = &p[model.places_of(place)];
     let fitted = Fitted {
         law: &Law::rudd(p[0].exp(), p[1].exp()),
         context: &data.context,

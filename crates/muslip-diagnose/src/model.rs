@@ -58,6 +58,14 @@ impl Model {
         [0, 1].into_iter().chain(of_terms).collect()
     }
 
+    /// Places in that vector of one term's parameters.
+    #[must_use]
+    pub fn places_of(&self, term: usize) -> core::ops::Range<usize> {
+        let before = self.terms[..term].iter().map(|own| own.parameters.len());
+        let first = self.base.len() + before.sum::<usize>();
+        first..first + self.terms[term].parameters.len()
+    }
+
     /// The same model with other parameters.
     #[must_use]
     pub fn with(&self, p: &[f64]) -> Self {
@@ -397,6 +405,19 @@ mod tests {
     use super::*;
     use crate::data::Data;
     use crate::innovations::toy::{Noise, stop};
+
+    #[test]
+    fn a_term_s_parameters_stand_at_its_places_in_the_vector() {
+        let mut model = Model::of_law(0.9, 0.12);
+        for parameters in [vec![1.0, 2.0], vec![], vec![3.0]] {
+            let entry = model.terms.len();
+            model.terms.push(Term { entry, parameters });
+        }
+        let all = model.vector();
+        for (place, term) in model.terms.iter().enumerate() {
+            assert_eq!(all[model.places_of(place)], term.parameters);
+        }
+    }
 
     #[test]
     fn what_is_called_a_filter_is_linear_and_adds_nothing_of_its_own() {

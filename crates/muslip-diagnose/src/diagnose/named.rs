@@ -153,9 +153,7 @@ impl Answer<'_> {
             stds_from_none(own, *std, &self.data) > LEAST_STDS_OF_FIGURE
         };
         let parameters = &taken_up.model.terms[place].parameters;
-        let before = &taken_up.model.terms[..place];
-        let before = before.iter().map(|term| term.parameters.len());
-        let first = taken_up.model.base.len() + before.sum::<usize>();
+        let first = taken_up.model.places_of(place).start;
         let by_no_figure = self.data.catalogue.get(entry).by_no_figure();
         let varies = |own: &usize| {
             let std = covariance[(first + own, first + own)].sqrt();

@@ -123,7 +123,7 @@ fn held(
     knots: &[f64],
 ) -> Vec<usize> {
     if *variable == Variable::Slip {
-        let [peak, slip] = [0, 1].map(|parameter| {
+        let [peak, mut slip] = [0, 1].map(|parameter| {
             about(data, values, knots, |s, k| {
                 let x = s.slip(k, data.context.radius) / data.context.nominal[1];
                 let bottom = 1.0 + x * x;
@@ -132,7 +132,6 @@ fn held(
             })
         });
         let first = fullest(&peak);
-        let mut slip = slip;
         slip[first] = -1.0;
         let mut held = vec![first, fullest(&slip)];
         held.sort_unstable();
@@ -429,12 +428,8 @@ mod tests {
             let root = whole.cholesky().unwrap().inverse();
             (root * rest).eigenvalues().unwrap().min()
         };
-        let of_tyre = |variable: Variable| {
-            let all = on(&data, &variable).into_iter();
-            all.filter(|own| own.balance == Balance::Tyre)
-                .collect::<Vec<_>>()
-        };
-        let along = of_tyre(Variable::Slip);
+        let mut along = on(&data, &Variable::Slip);
+        along.retain(|own| own.balance == Balance::Tyre);
         assert_eq!(along.len(), 2);
         for own in &along {
             let left = left(own);
