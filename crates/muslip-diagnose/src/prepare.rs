@@ -196,8 +196,9 @@ pub fn prepare(
     classify(&mut series, rig);
     faults.extend(too_slow(&series));
     form_balances(&mut series, rig, &sound, &breaks);
-    series.distance = travelled(&series.speed.smooth, &dt);
-    series.angle = travelled(&series.wheel.smooth, &dt);
+    let known = counted(time, &series.still, &breaks, &dt);
+    series.distance = travelled(&series.speed.smooth, &known);
+    series.angle = travelled(&series.wheel.smooth, &known);
     series.dt = dt;
     let wheel = &series.wheel;
     series.wheel_smoothing =
@@ -360,6 +361,26 @@ fn form_balances(series: &mut Series, rig: &Rig, sound: &Sound, breaks: &[bool])
     series.vehicle_balance = vehicle_balance;
 }
 
+/// Time in s before a gap within which a vehicle is seen to stand: one sample of a noisy speed at the end of a stretch says
+/// little.
+const STOOD_S: f64 = 0.2;
+
+/// Steps of time over which a way is known: how far a vehicle came in a gap that begins at a standstill, nobody recorded, so
+/// its way counts from there on.
+fn counted(time: &[f64], still: &[bool], breaks: &[bool], dt: &[f64]) -> Vec<f64> {
+    let mut known = dt.to_vec();
+    for k in (1..dt.len()).filter(|k| breaks[*k]) {
+        let before = (0..k).rev();
+        let stood = before
+            .take_while(|j| time[k - 1] - time[*j] < STOOD_S)
+            .any(|j| still[j]);
+        if stood {
+            known[k] = 0.0;
+        }
+    }
+    known
+}
+
 /// What a rate has come to since the first sample.
 fn travelled(rate: &[f64], dt: &[f64]) -> Vec<f64> {
     let mut sum = 0.0;
@@ -372,4 +393,28 @@ fn travelled(rate: &[f64], dt: &[f64]) -> Vec<f64> {
             sum
         })
         .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_way_counts_from_where_a_vehicle_that_stood_is_recorded_moving() {
+        let dt = [0.1, 0.1, 3.0, 0.1, 3.0];
+        let gap = dt.map(|dt| dt > 1.0);
+        let way = |still: [bool; 5], speed: [f64; 5]| {
+            let time = [0.0, 0.1, 3.1, 3.2, 6.2];
+            let all = travelled(&speed, &counted(&time, &still, &gap, &dt));
+            *all.last().unwrap()
+        };
+        let stood = [true, true, false, false, false];
+        // 0.2 m in the step at 2 m/s, and 6 m in a gap at that speed, which it drove through.
+        let speed = [0.0, 0.0, 2.0, 2.0, 2.0];
+        assert!((way(stood, speed) - 6.2).abs() < 1e-12);
+        assert!((way([false; 5], [2.0; 5]) - 12.4).abs() < 1e-12);
+        // The last sample before the gap seems to move.
+        let seems_to_move = [true, false, false, false, false];
+        assert!((way(seems_to_move, speed) - 6.2).abs() < 1e-12);
+    }
 }

@@ -78,9 +78,9 @@ pub struct Series {
     pub beside_law: Vec<f64>,
     /// Brake torque in N m that enters the wheel balance, where there is a brake column.
     pub torque: Option<Channel>,
-    /// Distance run since the first sample in m.
+    /// Distance run since the first sample in m, but in gaps that begin at a standstill.
     pub distance: Vec<f64>,
-    /// Wheel angle since the first sample in rad.
+    /// Wheel angle since the first sample in rad, as the distance.
     pub angle: Vec<f64>,
     /// By exp(-c f^2) smoothing makes what has the angular frequency f smaller in the wheel speed: c in s^2.
     pub wheel_smoothing: f64,

@@ -5,72 +5,101 @@ use super::prelude::*;
 /// Longest stretches that are searched for, as shares of the track.
 const LONGEST: [f64; 3] = [1.0, 0.35, 0.12];
 
-/// Search over stretches of track: residual against predicted drag, by bins of distance.
+/// Search over stretches of track: residual against predicted drag, by bins of distance, first coarsely.
 #[derive(Clone)]
 struct Scan {
     bin: f64,
-    /// Σ w f r and Σ w f² by bin.
+    /// Σ w f r and Σ w f² up to each bin, and over all of them.
     cross: Vec<f64>,
     power: Vec<f64>,
 }
 
+/// A stretch by its first bin and the one behind its last, how much friction changes on it, and what that explains beyond
+/// a common factor.
+#[derive(Clone, Copy)]
+struct Stretch {
+    bins: [usize; 2],
+    change: f64,
+    gain: f64,
+}
+
 impl Scan {
-    const BINS: usize = 96;
+    /// Bins of the search, and fine ones in each of these: an edge that starts farther from its place than it is wide has no
+    /// slope to follow.
+    const COARSE: usize = 96;
+    const FINE: usize = 16;
+    const BINS: usize = Self::COARSE * Self::FINE;
+    /// Fewest fine bins of a stretch: no shorter one may be named.
+    const SHORTEST: usize = 4;
 
     fn new(context: &Context, series: &[Series], evidence: &[Residuals]) -> Self {
         let bin = (context.distance / Self::BINS as f64).max(1e-6);
         let mut scan = Self {
             bin,
-            cross: vec![0.0; Self::BINS],
-            power: vec![0.0; Self::BINS],
+            cross: vec![0.0; Self::BINS + 1],
+            power: vec![0.0; Self::BINS + 1],
         };
         for (run, e) in series.iter().zip(evidence) {
             for k in 0..run.len() {
                 let b = ((run.distance[k] / bin) as usize).min(Self::BINS - 1);
                 let (f, w) = (e.predicted[k], e.weight[k]);
                 if w > 0.0 {
-                    scan.cross[b] += w * f * e.residual[k].clamp(-4.0 / w.sqrt(), 4.0 / w.sqrt());
-                    scan.power[b] += w * f * f;
+                    scan.cross[b + 1] +=
+                        w * f * e.residual[k].clamp(-4.0 / w.sqrt(), 4.0 / w.sqrt());
+                    scan.power[b + 1] += w * f * f;
                 }
+            }
+        }
+        for sums in [&mut scan.cross, &mut scan.power] {
+            for b in 0..Self::BINS {
+                sums[b + 1] += sums[b];
             }
         }
         scan
     }
 
-    /// Start, length and relative change of the stretch, no longer than this share of the track, that explains most
-    /// beyond a common factor.
-    fn best(&self, longest: f64) -> Option<(f64, f64, f64)> {
-        let most = (longest * Self::BINS as f64) as usize;
-        let all_cross: f64 = self.cross.iter().sum();
-        let all_power: f64 = self.power.iter().sum();
-        let mut best: Option<(f64, (f64, f64, f64))> = None;
-        for from in 0..Self::BINS {
-            let (mut c, mut q) = (0.0, 0.0);
-            for to in from..Self::BINS.min(from + most) {
-                c += self.cross[to];
-                q += self.power[to];
-                let rest = all_power - q;
-                if q < 1e-4 * all_power || rest < 0.1 * all_power {
-                    continue;
-                }
-                let change = c / q - (all_cross - c) / rest;
-                let gain = change * change * q * rest / all_power;
-                if best.is_none_or(|b| gain > b.0) {
-                    let length = (to + 1 - from) as f64 * self.bin;
-                    best = Some((gain, (from as f64 * self.bin, length, change)));
-                }
-            }
+    /// The stretch of these bins; nothing where there is too little on it, or beside it.
+    fn stretch(&self, from: usize, to: usize) -> Option<Stretch> {
+        let [all_cross, all_power] = [&self.cross, &self.power].map(|sums| sums[Self::BINS]);
+        let [c, q] = [&self.cross, &self.power].map(|sums| sums[to] - sums[from]);
+        let rest = all_power - q;
+        if q < 1e-4 * all_power || rest < 0.1 * all_power {
+            return None;
         }
-        best.map(|b| b.1)
+        let change = c / q - (all_cross - c) / rest;
+        Some(Stretch {
+            bins: [from, to],
+            change,
+            gain: change * change * q * rest / all_power,
+        })
+    }
+
+    /// The stretch, no longer than this share of the track, that explains most.
+    fn best(&self, longest: f64) -> Option<Stretch> {
+        let most = (longest * Self::COARSE as f64) as usize;
+        let coarse = (0..Self::COARSE).flat_map(|from| {
+            (from + 1..=Self::COARSE.min(from + most))
+                .map(move |to| [from, to].map(|b| b * Self::FINE))
+        });
+        let best = self.best_of(coarse)?;
+        let about = |b: usize| b.saturating_sub(Self::FINE)..=(b + Self::FINE).min(Self::BINS);
+        let fine =
+            about(best.bins[0]).flat_map(|from| about(best.bins[1]).map(move |to| [from, to]));
+        let lengths = Self::SHORTEST..=most * Self::FINE;
+        self.best_of(fine.filter(|[from, to]| lengths.contains(&to.saturating_sub(*from))))
+    }
+
+    fn best_of(&self, bins: impl Iterator<Item = [usize; 2]>) -> Option<Stretch> {
+        bins.filter_map(|[from, to]| self.stretch(from, to))
+            .max_by(|a, b| a.gain.total_cmp(&b.gain))
     }
 
     /// Removes a stretch that has been found.
-    fn take(&mut self, from: f64, length: f64, change: f64) {
-        for b in 0..Self::BINS {
-            let centre = (b as f64 + 0.5) * self.bin;
-            if centre >= from && centre < from + length {
-                self.cross[b] -= change * self.power[b];
-            }
+    fn take(&mut self, found: Stretch) {
+        let [from, to] = found.bins;
+        for b in from + 1..=Self::BINS {
+            let power = self.power[b.min(to)] - self.power[from];
+            self.cross[b] -= found.change * power;
         }
     }
 }
@@ -120,11 +149,12 @@ impl Describe for SurfacePatch {
             let mut scan = fresh.clone();
             let mut start = Vec::new();
             for _ in 0..self.patches {
-                let Some((from, length, change)) = scan.best(longest) else {
+                let Some(found) = scan.best(longest) else {
                     break;
                 };
-                start.extend([from, length, 0.8 * change]);
-                scan.take(from, length, change);
+                let [from, to] = found.bins.map(|b| b as f64 * scan.bin);
+                start.extend([from, to - from, 0.8 * found.change]);
+                scan.take(found);
             }
             if start.len() == 3 * self.patches && !starts.contains(&start) {
                 starts.push(start);
@@ -168,7 +198,7 @@ impl Describe for SurfacePatch {
             smallest: "three percent of friction over a few metres",
             smallest_size: |_| 0.03,
             compensation: Compensation::Not("a property of the track, not of the tyre"),
-            carried: "only to runs that start at the same place of the same track: distance counts from the first sample",
+            carried: "only to runs that start at the same place of the same track: distance counts from the first sample, without gaps that begin at a standstill",
             example: Example::of("one", &[20.0, 15.0, -0.15]),
         }
     }
@@ -194,5 +224,50 @@ impl<T: Number> Mechanism<T> for SurfacePatch {
             .min_by(|a, b| a[0].value().total_cmp(&b[0].value()))
             .map_or(T::constant(0.0), |part| part[0]);
         vec![Reported::new("start", "m", first)]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn edges_of_a_stretch_are_found_to_a_fine_bin() {
+        // Two stretches of 10 m, whose edges lie within bins of 0.1 m.
+        let distance: Vec<f64> = (0..5000).map(|k| 0.002 * f64::from(k)).collect();
+        let change = |x: f64| match x {
+            2.537..4.171 => -0.2,
+            7.262..7.813 => 0.15,
+            _ => 0.0,
+        };
+        let residuals = Residuals {
+            predicted: vec![100.0; distance.len()],
+            residual: distance.iter().map(|x| 100.0 * change(*x)).collect(),
+            weight: vec![1e-2; distance.len()],
+        };
+        let context = Context {
+            distance: 10.0,
+            ..Context::default()
+        };
+        let series = Series {
+            time: distance.clone(),
+            distance,
+            ..Series::default()
+        };
+        let two = SurfacePatch { patches: 2 };
+        let starts = two.starts(&Search {
+            context: &context,
+            series: &[series],
+            residuals: &[residuals],
+        });
+        let fine = 10.0 / Scan::BINS as f64;
+        let near = |a: f64, b: f64| (a - b).abs() < 1.5 * fine;
+        let found = |s: &Vec<f64>| {
+            near(s[0], 2.537)
+                && near(s[0] + s[1], 4.171)
+                && near(s[3], 7.262)
+                && near(s[3] + s[4], 7.813)
+        };
+        assert!(starts.iter().any(found), "{starts:?}");
     }
 }
