@@ -18,7 +18,7 @@ use crate::innovations::noise::Slopes;
 use crate::innovations::rows::tyre_row_of;
 use crate::innovations::screen::{Score, scores};
 use crate::looked::{self, Seen};
-use crate::mechanism::{Id, Residuals};
+use crate::mechanism::{Facts, Id, Residuals};
 use crate::model::{Model, Term};
 use crate::series::Series;
 
@@ -96,7 +96,8 @@ fn best_start<'a>(
 }
 
 /// Best candidates of a screen but of the ids passed over: at most `count` ids, at most two forms of each, each form at
-/// its best start; and beside them the counter-forms of these ids.
+/// its best start; and beside them the counter-forms of these ids, and what the noise of a run is like, whatever it gains:
+/// of that the screen, at one size of the noise, says nothing.
 fn best(
     data: &Data,
     candidates: &[Candidate],
@@ -107,10 +108,11 @@ fn best(
     let price = |s: &Score| {
         PRICE_OF_PARAMETER * candidates[s.candidate].columns.len() as f64 + PRICE_OF_NAME
     };
-    let counter = |s: &Score| {
+    let says = |s: &Score, fact: fn(&Facts) -> bool| {
         let entry = candidates[s.candidate].entry;
-        entry.is_some_and(|entry| data.catalogue.get(entry).facts().counter_form)
+        entry.is_some_and(|entry| fact(&data.catalogue.get(entry).facts()))
     };
+    let counter = |s: &Score| says(s, |facts| facts.counter_form);
     let mut best_first: Vec<&Score> = all.iter().filter(|s| !counter(s)).collect();
     best_first.sort_by(|a, b| (b.gain - price(b)).total_cmp(&(a.gain - price(a))));
     let mut out: Vec<(usize, Score)> = Vec::new();
@@ -122,25 +124,19 @@ fn best(
             continue;
         }
         // An effect that would have to be turned round is not that effect.
-        if candidate.free.is_empty() && !(score.coefficients[0] > 0.0) {
+        let turned = candidate.free.is_empty() && !(score.coefficients[0] > 0.0);
+        let gains = score.gain > price(score) && !turned;
+        let asked_for = says(score, |facts| facts.like_noise_of_run);
+        if !gains && !asked_for {
             continue;
         }
-        if !(score.gain > price(score)) {
-            continue;
-        }
-        if out
-            .iter()
-            .filter(|(c, _)| candidates[*c].id == candidate.id)
-            .count()
-            >= 2
-            || out
-                .iter()
-                .any(|(c, _)| candidates[*c].entry == candidate.entry)
-        {
+        let of_id = |(c, _): &&(usize, Score)| candidates[*c].id == candidate.id;
+        let tried = |(c, _): &(usize, Score)| candidates[*c].entry == candidate.entry;
+        if out.iter().filter(of_id).count() >= 2 || out.iter().any(tried) {
             continue;
         }
         if !ids.contains(&id) {
-            if ids.len() == count {
+            if ids.len() >= count && !asked_for {
                 continue;
             }
             ids.push(id);
@@ -469,7 +465,11 @@ mod tests {
             let all = trials.iter().filter_map(Trial::mechanism);
             all.map(|own| own.0).collect()
         };
-        assert!(!ids(&screen.trials()).contains(&Id::ForceLag));
+        let tried = ids(&screen.trials());
+        assert!(!tried.contains(&Id::ForceLag));
+        // But for what the noise of a run is like.
+        let like_noise_of_run = [Id::EffectiveRadius, Id::RollingResistance];
+        assert!(like_noise_of_run.iter().all(|id| tried.contains(id)));
         let entries = [Id::ForceLag, Id::ForceDelay].map(|id| entry_of(&data, id));
         let asked = screen.trials_of(&entries);
         let mut found = ids(&asked);

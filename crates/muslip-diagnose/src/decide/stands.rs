@@ -2,22 +2,35 @@
 
 use super::trial::{Claim, Trial};
 use crate::constants::{
-    CLEARLY_PREDICTED, DEPENDENCE_WORTH, FEWEST_RUNS_AGREED, INDIFFERENT_NATS,
+    AGREED_PREDICTED, CLEARLY_PREDICTED, DEPENDENCE_WORTH, FEWEST_RUNS_AGREED, INDIFFERENT_NATS,
     LARGE_GAIN_AT_SENSORS, LARGE_GAIN_OF_DEPENDENCE_AT_SENSORS, LARGE_GAIN_ON_UNSEEN,
-    LARGE_TO_WORTH, LEAST_EFFECT, LEAST_GAIN, LEAST_GAIN_AT_SENSORS,
-    LEAST_GAIN_OF_DEPENDENCE_AT_SENSORS, LEAST_PREDICTED, LEAST_PREDICTED_BY_DEPENDENCE, LEAST_T,
-    LEAST_T_AT_SENSORS, LEAST_T_AT_SENSORS_NOT_FED, LEAST_T_NOT_FED, LEAST_T_OF_AGREED,
-    LEAST_T_OF_DEPENDENCE, LEAST_T_OF_DEPENDENCE_AT_SENSORS, LEAST_T_OF_LARGE, LEAST_T_OF_LIKELIER,
-    LINED_UP_PREDICTED, LINED_UP_PREDICTED_BY_DEPENDENCE, PREDICTED_APART,
+    LARGE_TO_WORTH, LARGELY_PREDICTED, LEAST_EFFECT, LEAST_GAIN, LEAST_GAIN_AT_SENSORS,
+    LEAST_GAIN_OF_AGREED, LEAST_GAIN_OF_DEPENDENCE_AT_SENSORS, LEAST_PREDICTED,
+    LEAST_PREDICTED_BY_DEPENDENCE, LEAST_T, LEAST_T_AT_SENSORS, LEAST_T_AT_SENSORS_NOT_FED,
+    LEAST_T_NOT_FED, LEAST_T_OF_AGREED, LEAST_T_OF_DEPENDENCE, LEAST_T_OF_DEPENDENCE_AT_SENSORS,
+    LEAST_T_OF_LARGE, LEAST_T_OF_LIKELIER, LEAST_T_OF_PREDICTED, LINED_UP_PREDICTED,
+    LINED_UP_PREDICTED_BY_DEPENDENCE, PREDICTED_APART,
 };
 
 impl Trial {
-    /// How much speaks for it at both levels of the noise: the geometric mean of its gains. Fitted noise that is
-    /// indifferent to what it hides counts for one nat.
+    /// Gain that counts, in nats: fitted noise that is indifferent to what it hides counts for one, and what unseen runs agree
+    /// on for what that is worth.
+    #[must_use]
+    pub fn gain_that_counts(&self) -> f64 {
+        let least = if unseen_runs_agree(self) {
+            of_agreement(self)
+        } else if hidden(self) {
+            1.0
+        } else {
+            0.0
+        };
+        self.gain.max(least)
+    }
+
+    /// How much speaks for it at both levels of the noise: the geometric mean of its gains.
     #[must_use]
     pub fn weight(&self) -> f64 {
-        let least = if hidden(self) { 1.0 } else { 0.0 };
-        (self.gain.max(least) * self.at_sensors.0.max(0.0)).sqrt()
+        (self.gain_that_counts() * self.at_sensors.0.max(0.0)).sqrt()
     }
 
     /// What all unseen runs gain by it in nats, at the noise at which it stands: as fitted, or at the sensors' where the
@@ -37,10 +50,18 @@ fn worth(trial: &Trial) -> f64 {
     0.5 * LEAST_EFFECT * LEAST_EFFECT * trial.readings as f64
 }
 
-/// Whether a trial could be named, were it seen: large enough, itself, neither a memory of the chain's nor what one leaves,
-/// and better at predicting, or hardly worse where it gains much.
+/// What it is worth in nats that so many runs agree so well, whatever their own noise is: the logarithm of Student's
+/// likelihood ratio.
+fn of_agreement(trial: &Trial) -> f64 {
+    let runs = trial.runs as f64;
+    0.5 * runs * (trial.unseen.1.powi(2) / (runs - 1.0).max(1.0)).ln_1p()
+}
+
+/// Whether a trial could be named, were it seen: large enough, by what it gains or by the drag that it predicts, itself,
+/// neither a memory of the chain's nor what one leaves, and better at predicting, or hardly worse where it gains much.
 fn could_be_named(trial: &Trial) -> bool {
-    trial.size > worth(trial) && is_plausible(trial)
+    let large = trial.size > worth(trial) || unseen_runs_agree(trial);
+    large && is_plausible(trial)
 }
 
 /// Whether nothing says that a trial is something else than its claim.
@@ -76,7 +97,7 @@ pub fn gains_beyond_chain(trial: &Trial) -> bool {
 /// Gain from which a name that unseen runs bear out is seen, nats.
 fn least_gain_of_name(trial: &Trial) -> f64 {
     if unseen_runs_agree(trial) {
-        0.0
+        LEAST_GAIN_OF_AGREED
     } else {
         LEAST_GAIN
     }
@@ -106,11 +127,14 @@ fn hidden(trial: &Trial) -> bool {
     trial.first && gains && seen_at_sensors(trial)
 }
 
-/// Whether what unseen runs say is enough by itself: several, alike, of the drag, and of what no measuring chain leaves.
+/// Whether what unseen runs say is enough by itself: several, alike, of the drag, of what no measuring chain leaves, nor the
+/// form of what was named before, which is the same in all runs.
 fn unseen_runs_agree(trial: &Trial) -> bool {
     let (mean, t) = trial.unseen;
     let alike = trial.runs >= FEWEST_RUNS_AGREED && mean > 0.0 && t > LEAST_T_OF_AGREED;
-    alike && !trial.fed_by_chain && lowers_drag_s_error(trial.predicts, CLEARLY_PREDICTED)
+    let by_itself = trial.mechanism().is_some() && trial.first && !trial.fed_by_chain;
+    let gains = trial.gain > LEAST_GAIN_OF_AGREED;
+    alike && by_itself && gains && lowers_drag_s_error(trial.predicts, AGREED_PREDICTED)
 }
 
 /// Whether a trial is as good as one that stands but for how alike unseen runs speak for it.
@@ -130,7 +154,8 @@ pub fn rivals(trial: &Trial) -> bool {
 /// Whether unseen runs gain, alike or not.
 fn gains_on_unseen_runs(trial: &Trial) -> bool {
     let (mean, t) = trial.unseen;
-    trial.gain > least_gain_of_name(trial) && mean > 0.0 && t > LEAST_T_OF_LIKELIER
+    let speaks = mean > 0.0 && t > LEAST_T_OF_LIKELIER || largely_predicts(trial);
+    trial.gain > least_gain_of_name(trial) && speaks
 }
 
 /// Whether a name is of use beside others that were named: whatever it is worth alone was settled when it was taken up. Of
@@ -195,7 +220,7 @@ fn seen_on_unseen_runs(trial: &Trial) -> bool {
             let several = trial.runs >= FEWEST_RUNS_AGREED;
             let of_few =
                 trial.unanimous[0] && (clearly || large && several) || several && undisputed(trial);
-            mean > 0.0 && (t >= least || of_few)
+            mean > 0.0 && (t >= least || of_few) || largely_predicts(trial)
         }
         // What says nothing of what it is has to be seen at the sensors' noise as well: fitted noise may have left it.
         Claim::Dependence(_) => {
@@ -211,11 +236,12 @@ fn lined_up(trial: &Trial) -> bool {
     trial.unanimous[1] && trial.gain > 0.0 && lowers
 }
 
-/// Whether gains are uneven because few of several runs reach what a name is of, which no chain leaves.
+/// Whether gains are uneven because few of several runs reach what a name is of, or show most of it, which no chain leaves.
 #[must_use]
 pub fn few_reach(trial: &Trial) -> bool {
     let several = trial.runs >= FEWEST_RUNS_AGREED;
-    undisputed(trial) || several && !trial.fed_by_chain && lined_up(trial)
+    let of_several = several && !trial.fed_by_chain && lined_up(trial);
+    undisputed(trial) || of_several || largely_predicts(trial)
 }
 
 /// Whether a name that no measuring chain leaves gains much at both levels of the noise, and hardly a run speaks against it:
@@ -224,6 +250,16 @@ fn undisputed(trial: &Trial) -> bool {
     let least = LARGE_TO_WORTH * worth(trial);
     let much = trial.gain > least && trial.at_sensors.0 > least;
     much && trial.unanimous == [true; 2] && !trial.fed_by_chain
+}
+
+/// Whether a name that no measuring chain leaves gains on several unseen runs, and takes so much of the error of the drag that
+/// it need not gain alike on them: what wears off shows most on the first and the last.
+fn largely_predicts(trial: &Trial) -> bool {
+    let (mean, t) = trial.unseen;
+    let speaks = trial.runs >= FEWEST_RUNS_AGREED && mean > 0.0 && t > LEAST_T_OF_PREDICTED;
+    let by_itself = trial.mechanism().is_some() && !trial.fed_by_chain && !trial.remembers;
+    let gains = trial.gain > LEAST_GAIN;
+    speaks && by_itself && gains && lowers_drag_s_error(trial.predicts, LARGELY_PREDICTED)
 }
 
 /// Whether the drag's mean square error falls by more than this logarithm. What does not work through the force predicts
@@ -320,7 +356,7 @@ mod tests {
         let data = stop(Noise::TYPICAL, 4);
         let base = toy::settled(&data);
         let trial = |predicts: f64, against: bool| Trial {
-            gain: 10.0,
+            gain: 4.0,
             at_sensors: (60.0, 1.2),
             first: true,
             predicts,
@@ -361,6 +397,7 @@ mod tests {
         let data = stop(Noise::TYPICAL, 4);
         let base = toy::settled(&data);
         let wear = |t: f64, predicts: f64| Trial {
+            first: true,
             predicts,
             at_sensors: (2.0, 1.0),
             ..of_name(&data, &base, Id::WearDrift, 2.0, t)
@@ -368,7 +405,7 @@ mod tests {
         assert!(stands(&wear(3.6, 0.32)) && needed(&wear(3.6, 0.32)));
         let refused = [
             wear(2.9, 0.32),
-            wear(3.6, 0.2),
+            wear(3.6, 0.14),
             // An inertia predicts no drag.
             wear(3.6, f64::INFINITY),
             Trial {
@@ -380,10 +417,75 @@ mod tests {
                 ..wear(3.6, 0.32)
             },
             Trial {
-                gain: -0.1,
+                gain: -2.1,
                 ..wear(3.6, 0.32)
             },
         ];
+        assert!(refused.iter().all(|trial| !stands(trial)));
+    }
+
+    #[test]
+    fn what_all_runs_show_is_worth_its_agreement_however_much_noise_of_a_run_takes_of_it() {
+        let data = stop(Noise::TYPICAL, 4);
+        let base = toy::settled(&data);
+        let radius = |t: f64, gain: f64| Trial {
+            gain,
+            first: true,
+            runs: 6,
+            predicts: 0.2,
+            at_sensors: (4.0, 1.8),
+            // Less than the least effect that is worth a name gains.
+            size: 1.0,
+            readings: 20_000,
+            ..of_name(&data, &base, Id::EffectiveRadius, 4.0, t)
+        };
+        assert!(stands(&radius(3.2, -1.0)) && !stands(&radius(3.2, -3.0)));
+        assert!(!stands(&radius(2.8, -1.0)) && !stands(&radius(2.8, 4.0)));
+        // Six runs with a t of 4: 3 ln(1 + 16/5) = 4.3 nats.
+        let agreed = radius(4.0, -1.0);
+        assert!((of_agreement(&agreed) - 4.305).abs() < 1e-3);
+        assert!((agreed.weight() - (4.305f64 * 4.0).sqrt()).abs() < 1e-3);
+        assert_eq!(radius(2.8, -1.0).weight(), 0.0);
+        assert_eq!(radius(4.0, -3.0).weight(), 0.0);
+        // What another name's form leaves is the same in all runs, too.
+        let left = Trial {
+            first: false,
+            ..radius(4.0, -1.0)
+        };
+        assert!(!stands(&left));
+    }
+
+    #[test]
+    fn what_takes_two_fifths_of_the_drag_s_error_need_not_gain_alike() {
+        let data = stop(Noise::TYPICAL, 4);
+        let base = toy::settled(&data);
+        let wear = |nats: f64, predicts: f64| Trial {
+            predicts,
+            at_sensors: (7.0, 1.1),
+            unanimous: [false, false],
+            ..of_name(&data, &base, Id::WearDrift, nats, 0.8)
+        };
+        let largely = wear(12.0, 0.55);
+        assert!(stands(&largely) && few_reach(&largely) && needed(&largely));
+        assert!(!stands(&wear(12.0, 0.45)) && !stands(&wear(4.0, 0.55)));
+        let fed = Trial {
+            fed_by_chain: true,
+            ..wear(12.0, 0.55)
+        };
+        let memory = Trial {
+            remembers: true,
+            ..wear(12.0, 0.55)
+        };
+        let of_three = Trial {
+            runs: 3,
+            ..wear(12.0, 0.55)
+        };
+        // As many nats against it as for it.
+        let disputed = Trial {
+            unseen: (2.0, 0.4),
+            ..wear(12.0, 0.55)
+        };
+        let refused = [fed, memory, of_three, disputed];
         assert!(refused.iter().all(|trial| !stands(trial)));
     }
 

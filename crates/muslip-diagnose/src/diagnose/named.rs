@@ -76,7 +76,7 @@ impl Answer<'_> {
                         .map_or(String::new(), |other| separating_test(id, other).to_owned()),
                     confusable_with: sure.others,
                     effect_sigma: finite_or_zero(
-                        (2.0 * trial.gain.max(0.0) / samples.max(1) as f64).sqrt(),
+                        (2.0 * trial.gain_that_counts() / samples.max(1) as f64).sqrt(),
                     ),
                 })
             })

@@ -193,6 +193,9 @@ pub struct Facts {
     /// Whether a measuring chain leaves what looks like it: kernels that differ, slip's noise that flattens the curve, the
     /// pitch of a ring.
     pub fed_by_chain: bool,
+    /// Whether the noise has a part of each run that is like it, an offset of the slip or of the drag: only where runs are
+    /// weighed against each other does it show that it is the same in all.
+    pub like_noise_of_run: bool,
 }
 
 impl Facts {
@@ -218,6 +221,7 @@ impl Facts {
             rare: false,
             filters: false,
             fed_by_chain: false,
+            like_noise_of_run: false,
         }
     }
 }

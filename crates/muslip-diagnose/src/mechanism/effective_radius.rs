@@ -37,6 +37,7 @@ impl Describe for EffectiveRadius {
         };
         Facts {
             form,
+            like_noise_of_run: true,
             ..Facts::of(Id::EffectiveRadius, Stage::Kinematics, equation)
         }
     }

@@ -17,6 +17,7 @@ impl Describe for RollingResistance {
         };
         Facts {
             form,
+            like_noise_of_run: true,
             ..Facts::of(
                 Id::RollingResistance,
                 Stage::Contact,
