@@ -130,11 +130,16 @@ fn hidden(trial: &Trial) -> bool {
 /// Whether what unseen runs say is enough by itself: several, alike, of the drag, of what no measuring chain leaves, nor the
 /// form of what was named before, which is the same in all runs.
 fn unseen_runs_agree(trial: &Trial) -> bool {
-    let (mean, t) = trial.unseen;
-    let alike = trial.runs >= FEWEST_RUNS_AGREED && mean > 0.0 && t > LEAST_T_OF_AGREED;
-    let by_itself = trial.mechanism().is_some() && trial.first && !trial.fed_by_chain;
+    let alike = several_name(trial, LEAST_T_OF_AGREED) && trial.first;
     let gains = trial.gain > LEAST_GAIN_OF_AGREED;
-    alike && by_itself && gains && lowers_drag_s_error(trial.predicts, AGREED_PREDICTED)
+    alike && gains && lowers_drag_s_error(trial.predicts, AGREED_PREDICTED)
+}
+
+/// Whether several unseen runs gain by a name that no measuring chain leaves, with a larger t than this.
+fn several_name(trial: &Trial, least_t: f64) -> bool {
+    let (mean, t) = trial.unseen;
+    let several = trial.runs >= FEWEST_RUNS_AGREED && mean > 0.0 && t > least_t;
+    several && trial.mechanism().is_some() && !trial.fed_by_chain
 }
 
 /// Whether a trial is as good as one that stands but for how alike unseen runs speak for it.
@@ -255,11 +260,9 @@ fn undisputed(trial: &Trial) -> bool {
 /// Whether a name that no measuring chain leaves gains on several unseen runs, and takes so much of the error of the drag that
 /// it need not gain alike on them: what wears off shows most on the first and the last.
 fn largely_predicts(trial: &Trial) -> bool {
-    let (mean, t) = trial.unseen;
-    let speaks = trial.runs >= FEWEST_RUNS_AGREED && mean > 0.0 && t > LEAST_T_OF_PREDICTED;
-    let by_itself = trial.mechanism().is_some() && !trial.fed_by_chain && !trial.remembers;
+    let speaks = several_name(trial, LEAST_T_OF_PREDICTED) && !trial.remembers;
     let gains = trial.gain > LEAST_GAIN;
-    speaks && by_itself && gains && lowers_drag_s_error(trial.predicts, LARGELY_PREDICTED)
+    speaks && gains && lowers_drag_s_error(trial.predicts, LARGELY_PREDICTED)
 }
 
 /// Whether the drag's mean square error falls by more than this logarithm. What does not work through the force predicts
