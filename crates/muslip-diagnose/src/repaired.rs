@@ -42,7 +42,8 @@ pub struct RepairedParameter {
     pub unit: String,
 }
 
-/// An empirical correction: hat functions of a variable. Outside its domain it fades to zero.
+/// An empirical correction: hat functions of a variable. Outside its domain the nearest knot's value holds: the law beside it was
+/// fitted with it, and is wrong without it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Correction {
     /// Variable.
@@ -528,8 +529,7 @@ impl Correction {
             .map(|k| {
                 let mut amount = match hat(&self.knots, values[k]) {
                     Some((at, w)) if self.values.len() == self.knots.len() => {
-                        let inside = self.values[at] * (1.0 - w) + self.values[at + 1] * w;
-                        inside * self.fade(values[k])
+                        self.values[at] * (1.0 - w) + self.values[at + 1] * w
                     }
                     _ => 0.0,
                 };
@@ -543,13 +543,40 @@ impl Correction {
             })
             .collect())
     }
+}
 
-    /// One inside the knots, falling to zero within a quarter of their span outside.
-    fn fade(&self, u: f64) -> f64 {
-        let (Some(low), Some(high)) = (self.knots.first(), self.knots.last()) else {
-            return 0.0;
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::innovations::toy::{Noise, settled, stop};
+
+    #[test]
+    fn beyond_its_knots_a_correction_is_that_of_the_nearest() {
+        let data = stop(Noise::NONE, 7);
+        let levers = Levers::new(&data, &settled(&data).model);
+        let slip = Variable::Slip.values(&data, 0);
+        let most = slip.iter().copied().fold(0.0, f64::max);
+        let correction = Correction {
+            variable: "slip".to_owned(),
+            acts_on: "friction".to_owned(),
+            form: String::new(),
+            knots: vec![0.1 * most, 0.2 * most],
+            values: vec![-0.3, 0.2],
+            harmonics: Vec::new(),
         };
-        let outside = (low - u).max(u - high).max(0.0);
-        (1.0 - outside / (0.25 * (high - low)).max(1e-300)).max(0.0)
+        let added = correction.apply(&data, &levers, 0).unwrap();
+        let shares = |beyond: &dyn Fn(f64) -> bool| -> Vec<f64> {
+            (0..slip.len())
+                .filter(|&k| beyond(slip[k]) && levers.force[0][k].abs() > 10.0)
+                .map(|k| added[k] / levers.force[0][k])
+                .collect()
+        };
+        let (below, above) = (
+            shares(&|slip| slip < 0.1 * most),
+            shares(&|slip| slip > 0.5 * most),
+        );
+        assert!(!below.is_empty() && !above.is_empty());
+        assert!(below.iter().all(|share| (share + 0.3).abs() < 1e-9));
+        assert!(above.iter().all(|share| (share - 0.2).abs() < 1e-9));
     }
 }

@@ -243,7 +243,7 @@ fn findings(diagnosis: &Diagnosis, views: &Views) -> Section {
         if let (Some(low), Some(high)) = (correction.knots.first(), correction.knots.last()) {
             blocks.push(Block::Paragraph(format!(
                 "The repaired model corrects the {} by a table of {} values over {}, {}; outside, the \
-                 correction fades out.",
+                 nearest value holds.",
                 spoken(&correction.acts_on),
                 correction.knots.len(),
                 variable(&correction.variable),
