@@ -207,7 +207,7 @@ pub fn robust_sigma(values: &[f64]) -> f64 {
         return 0.0;
     }
     let mut magnitudes: Vec<f64> = values.iter().map(|v| v.abs()).collect();
-    let median = 1.4826 * crate::smooth::median_in_place(&mut magnitudes);
+    let median = crate::smooth::SIGMA_PER_MAD * crate::smooth::median_in_place(&mut magnitudes);
     let n = values.len() as f64;
     let mut sigma = if median > 0.0 {
         median

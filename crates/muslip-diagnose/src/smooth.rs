@@ -25,6 +25,9 @@ pub struct Smoothed {
     pub variance_share: Vec<f64>,
 }
 
+/// Standard deviation of normal noise over the median of its sizes.
+pub const SIGMA_PER_MAD: f64 = 1.4826;
+
 /// Standard deviation of a channel's white noise from its third differences, robust to transients.
 ///
 /// Missing values (`NaN`) are passed over. Zero where the channel is exactly smooth.
@@ -40,7 +43,7 @@ pub fn difference_sigma(values: &[f64]) -> f64 {
     }
     let median = median_in_place(&mut differences);
     if median > 0.0 {
-        1.4826 * median / 20f64.sqrt()
+        SIGMA_PER_MAD * median / 20f64.sqrt()
     } else {
         // More than half of the differences vanish (a coarse quantum or a held value): what is left
         // of the noise shows in the mean square without the largest two percent.

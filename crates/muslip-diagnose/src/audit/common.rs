@@ -112,15 +112,19 @@ fn shared(rig: &Rig, runs: &[Recording]) -> Option<Memory> {
     // Means over samples that follow each other, the samples themselves taken in an instant.
     let grid = (step, step - sample);
     let range = (1, COMMON_LAG_S);
-    // A held speed owes the drag nothing: the wheel's own motion may be taken out, noise of its causes and all.
-    if !rig.coasting && speeds.iter().all(|s| s.unmoved.len() == s.wheel.len()) {
-        let quiet = structure(&pairs(|s| &s.unmoved), grid, range).memory(false);
-        let seen = structure(&pairs(|s| &s.wheel), grid, range).memory(false);
-        return [quiet, seen]
-            .into_iter()
-            .flatten()
-            .min_by(|a, b| a.std.total_cmp(&b.std))
-            .filter(Memory::is_sure);
+    // What the brake is known to do to the wheel, and the drag, may be taken out, noise of them and all: what the drag's adds
+    // to a coasting vehicle it takes from the wheel, which looks like no shared error.
+    if speeds.iter().all(|s| s.unmoved.len() == s.wheel.len()) {
+        let of = |wheel: fn(&Speeds) -> &Vec<f64>| structure(&pairs(wheel), grid, range);
+        // A torque that is read wrongly, or noisily, moves more than it takes out.
+        let (unmoved, seen) = (of(|s| &s.unmoved), of(|s| &s.wheel));
+        let lag = COMMON_LAG_S / 3.0;
+        let quiet = if unmoved.size_at(lag) < seen.size_at(lag) {
+            unmoved
+        } else {
+            seen
+        };
+        return quiet.memory(false).filter(Memory::is_sure);
     }
     let both = structure(&pairs(|s| &s.wheel), grid, range);
     let memory = both.memory(false).filter(Memory::is_sure)?;
@@ -168,4 +172,66 @@ pub fn common(rig: &Rig, runs: &[Recording]) -> Option<Finding> {
             1e3 * memory.time
         ))
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::recording::recording;
+    use super::super::toy::white;
+    use super::*;
+    use crate::campaign::Run;
+
+    const INERTIA: f64 = 1.2;
+
+    /// A coasting vehicle whose wheel is braked by an antiskid, both speeds read with an error that they share.
+    fn run(common: f64, with_brake: bool, phase: f64) -> Run {
+        let (dt, count, mass, radius) = (2e-3, 5000, 420.0, 0.31);
+        let mut white = white(5);
+        let mut normal = move || -> f64 { white.by_ref().take(4).map(|x| 3f64.sqrt() * x).sum() };
+        let kept = (-dt / 0.05f64).exp();
+        let (mut v, mut error) = (30.0, 0.0);
+        let (mut before, mut brake) = (f64::NAN, Vec::new());
+        let mut run = Run::default();
+        for k in 0..count {
+            let t = f64::from(k) * dt;
+            let slip = 0.2 * (1.0 - (2.3 * t + phase).cos()) * (0.5 + 0.5 * (35.0 * t).sin());
+            let u = slip / 0.12;
+            let force = 1000.0 * 2.0 * u / (1.0 + u * u);
+            let wheel = v * (1.0 - slip) / radius;
+            error = kept * error + (1.0 - kept * kept).sqrt() * normal();
+            let read = 1.0 + common * error;
+            run.time_s.push(t);
+            run.vehicle_speed_m_s.push(v * read + 0.01 * normal());
+            run.wheel_speed_rad_s.push(wheel * read + 0.05 * normal());
+            run.drag_force_n.push(force + 20.0 * normal());
+            run.normal_force_n.push(1200.0);
+            let change = if k > 0 { (wheel - before) / dt } else { 0.0 };
+            brake.push(radius * force - INERTIA * change);
+            before = wheel;
+            v -= dt * force / mass;
+        }
+        run.brake_torque_nm = with_brake.then_some(brake);
+        run
+    }
+
+    #[test]
+    fn what_both_speeds_err_by_is_told_while_the_wheel_is_braked() {
+        let rig = Rig {
+            radius_m: 0.31,
+            wheel_inertia_kg_m2: INERTIA,
+            mass_kg: 420.0,
+            coasting: true,
+            ..Rig::default()
+        };
+        let found = |common: f64, with_brake: bool| {
+            let runs = [0.0, 1.0, 2.0].map(|phase| run(common, with_brake, phase));
+            let all: Vec<Recording> = runs.iter().map(|own| recording(&rig, own)).collect();
+            shared(&rig, &all).map(|memory| memory.size())
+        };
+        for with_brake in [true, false] {
+            let (size, std) = found(0.004, with_brake).unwrap();
+            assert!((size / 0.004 - 1.0).abs() < 0.1, "{size} {std}");
+            assert_eq!(found(0.0, with_brake), None);
+        }
+    }
 }

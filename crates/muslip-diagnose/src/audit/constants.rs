@@ -121,6 +121,9 @@ pub const MEMORY_LAGS: usize = 20;
 pub const MEMORY_TIMES: usize = 24;
 /// A memory is told from so many standard deviations of its variance.
 pub const MEMORY_SIGMAS: f64 = 4.0;
+/// A second difference of so many standard deviations, as most of them have, is no noise's: a motion breaks off there. Of
+/// noise hardly one in a hundred thousand is as large.
+pub const MEMORY_BREAK_SIGMAS: f64 = 4.5;
 /// Longest lag at which wheel and vehicle speed are compared, s.
 pub const COMMON_LAG_S: f64 = 0.3;
 /// A common error is told from this share of each speed's own noise.

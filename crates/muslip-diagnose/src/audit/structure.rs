@@ -2,14 +2,15 @@
 //!
 //! Half the mean of the product of two series' second differences over a lag is three times the variance of what is
 //! white in both, and for a shared part of variance c² and time constant T it grows as c² (3 − 4 exp(−l/T) + exp(−2l/T)).
-//! Whatever runs straight has none; a motion that bends shows by the fourth power of the lag. Means over a width l₀ have
+//! Whatever runs straight has none; a motion that bends shows by the fourth power of the lag, and one that breaks off, as a
+//! ramp's end, by differences that no noise has. Means over a width l₀ have
 //! the covariance of means: 2 (x − 1 + exp(−x)) / x² of the variance at no lag, (2 sinh(x/2) / x)² of it beyond, x = l₀/T.
 
 use super::constants::{
-    LONGEST_COLOUR_S, MEMORY_BLOCK_S, MEMORY_GROUPS, MEMORY_LAGS, MEMORY_MOTION_S, MEMORY_SIGMAS,
-    MEMORY_TIMES,
+    LONGEST_COLOUR_S, MEMORY_BLOCK_S, MEMORY_BREAK_SIGMAS, MEMORY_GROUPS, MEMORY_LAGS,
+    MEMORY_MOTION_S, MEMORY_SIGMAS, MEMORY_TIMES,
 };
-use crate::smooth::median_in_place;
+use crate::smooth::{SIGMA_PER_MAD, median_in_place};
 use nalgebra::{Matrix3, Vector3};
 
 /// Two series on one even grid; products are multiplied by a weight of their own.
@@ -118,8 +119,46 @@ fn non_negative(gram: &Matrix3<f64>, pull: &Vector3<f64>) -> (Vector3<f64>, f64)
 struct Sums {
     /// Of each lag: products, squares of the first series, of the second, number.
     lags: Vec<[f64; 4]>,
+    /// Whether a motion breaks off within it, by lag: that says nothing of noise.
+    breaks_off: Vec<bool>,
     levels: Vec<f64>,
     series: usize,
+}
+
+/// The second difference of a series over a lag about a place.
+fn second_difference(x: &[f64], k: usize, lag: usize) -> f64 {
+    x[k + lag] - 2.0 * x[k] + x[k - lag]
+}
+
+/// Places of a series of so many values that have a second difference over a lag.
+fn places(count: usize, lag: usize) -> core::ops::Range<usize> {
+    lag..count.saturating_sub(lag)
+}
+
+/// Size of a second difference as its product counts.
+fn size_of(x: &[f64], factor: &[f64], k: usize, lag: usize) -> f64 {
+    second_difference(x, k, lag).abs() * factor[k].abs().sqrt()
+}
+
+/// Size beyond which a second difference over a lag is that of a motion that breaks off.
+fn size_of_breaks(pairs: &[Pair], lag: usize, pick: fn(&Pair) -> &[f64]) -> f64 {
+    let mut sizes: Vec<f64> = pairs
+        .iter()
+        .flat_map(|pair| {
+            let x = pick(pair);
+            // Neighbours say the same over a long lag.
+            let apart = places(x.len(), lag).step_by(lag.div_ceil(4));
+            let counts = apart.filter(|k| pair.factor[*k] != 0.0);
+            counts.map(move |k| size_of(x, &pair.factor, k, lag))
+        })
+        .collect();
+    let usual = median_in_place(&mut sizes);
+    // Of a channel that hardly moves whatever does would break off.
+    if usual > 0.0 {
+        MEMORY_BREAK_SIGMAS * SIGMA_PER_MAD * usual
+    } else {
+        f64::INFINITY
+    }
 }
 
 /// Sums over all series on grids of a step, of means over a width (both in s), from a lag of so many steps to one in s.
@@ -137,6 +176,13 @@ pub fn structure(
         })
         .collect();
     lags.dedup();
+    let breaks: Vec<[f64; 2]> = lags
+        .iter()
+        .map(|&lag| {
+            let of = |pick: fn(&Pair) -> &[f64]| size_of_breaks(pairs, lag, pick);
+            [of(|pair| &pair.a), of(|pair| &pair.b)]
+        })
+        .collect();
     let length = ((MEMORY_BLOCK_S / step) as usize).max(8);
     let mut blocks = Vec::new();
     for (series, pair) in pairs.iter().enumerate() {
@@ -145,6 +191,7 @@ pub fn structure(
             let end = (start + length).min(n);
             let mut sums = Sums {
                 lags: vec![[0.0; 4]; lags.len()],
+                breaks_off: vec![false; lags.len()],
                 levels: pair
                     .levels
                     .iter()
@@ -152,14 +199,21 @@ pub fn structure(
                     .collect(),
                 series,
             };
-            for (sum, &lag) in sums.lags.iter_mut().zip(&lags) {
-                for k in start.max(lag)..end.min(n.saturating_sub(lag)) {
-                    let second = |x: &[f64]| x[k + lag] - 2.0 * x[k] + x[k - lag];
-                    let (a, b, f) = (second(&pair.a), second(&pair.b), pair.factor[k]);
+            let of_lags = sums.lags.iter_mut().zip(&mut sums.breaks_off);
+            for ((sum, breaks_off), (&lag, &[most_a, most_b])) in
+                of_lags.zip(lags.iter().zip(&breaks))
+            {
+                let all = places(n, lag);
+                for k in start.max(all.start)..end.min(all.end) {
+                    let [a, b] = [&pair.a, &pair.b].map(|x| second_difference(x, k, lag));
+                    let f = pair.factor[k];
                     sum[0] += 0.5 * a * b * f;
                     sum[1] += 0.5 * a * a * f;
                     sum[2] += 0.5 * b * b * f;
                     sum[3] += 1.0;
+                    let [size_a, size_b] =
+                        [&pair.a, &pair.b].map(|x| size_of(x, &pair.factor, k, lag));
+                    *breaks_off |= size_a > most_a || size_b > most_b;
                 }
             }
             blocks.push(sums);
@@ -217,18 +271,20 @@ impl Structure {
             .collect()
     }
 
-    /// Products by lag with each block's weight: blocks in which much moves count little.
-    fn weighed(&self) -> Vec<Vec<[f64; 3]>> {
+    /// Products by lag with each block's weight: blocks in which much moves count little, and those in which a motion
+    /// breaks off, unless they are asked for, nothing.
+    fn weighed(&self, with_breaks: bool) -> Vec<Vec<[f64; 3]>> {
         self.lags
             .iter()
             .enumerate()
             .map(|(i, &lag)| {
                 let motions = self.motions(lag);
+                let counts = |b: &Sums| b.lags[i][3] > 0.0 && (with_breaks || !b.breaks_off[i]);
                 let usual = middle(
                     motions
                         .iter()
                         .zip(&self.blocks)
-                        .filter(|(_, b)| b.lags[i][3] > 0.0)
+                        .filter(|(_, b)| counts(b))
                         .map(|(m, _)| *m),
                 );
                 self.blocks
@@ -237,7 +293,7 @@ impl Structure {
                     .map(|(block, motion)| {
                         let s = &block.lags[i];
                         let weight = (usual + motion).powi(-2);
-                        if s[3] == 0.0 || !weight.is_finite() {
+                        if !counts(block) || !weight.is_finite() {
                             return [0.0; 3];
                         }
                         [
@@ -320,7 +376,7 @@ impl Structure {
         if self.blocks.len() < 2 * MEMORY_GROUPS {
             return None;
         }
-        let weighed = self.weighed();
+        let weighed = self.weighed(false);
         let all = self.fit(&self.means(&weighed, None), white)?;
         let others: Vec<Parts> = (0..MEMORY_GROUPS)
             .filter_map(|g| self.fit(&self.means(&weighed, Some(g)), white))
@@ -341,13 +397,22 @@ impl Structure {
         })
     }
 
-    /// Mean product at the lag nearest to one in s.
+    /// Mean product of all that moves at the lag nearest to one in s.
     #[must_use]
     pub fn at(&self, lag_s: f64) -> f64 {
-        self.means(&self.weighed(), None)
-            .into_iter()
-            .min_by(|a, b| (a.0 - lag_s).abs().total_cmp(&(b.0 - lag_s).abs()))
-            .map_or(0.0, |m| m.1)
+        self.nearest(lag_s).map_or(0.0, |(_, product, _)| product)
+    }
+
+    /// Mean size of these products.
+    #[must_use]
+    pub fn size_at(&self, lag_s: f64) -> f64 {
+        self.nearest(lag_s).map_or(0.0, |(_, _, size)| size)
+    }
+
+    /// Means at the lag nearest to one in s.
+    fn nearest(&self, lag_s: f64) -> Option<(f64, f64, f64)> {
+        let all = self.means(&self.weighed(true), None).into_iter();
+        all.min_by(|a, b| (a.0 - lag_s).abs().total_cmp(&(b.0 - lag_s).abs()))
     }
 }
 
@@ -424,6 +489,27 @@ mod tests {
             "{:?}",
             bent(2.0)
         );
+    }
+
+    #[test]
+    fn a_motion_that_breaks_off_is_no_memory_and_hides_none() {
+        // A speed that is held, and changed along a ramp four times in a minute.
+        let ramped = |shared: f64| {
+            let mut one = pair(shared, 12_000);
+            let mut held = 0.0;
+            for (k, x) in one.a.iter_mut().enumerate() {
+                if k % 3000 > 2000 && k % 3000 < 2200 {
+                    held += 0.5;
+                }
+                *x += held;
+            }
+            one.b = one.a.clone();
+            let all = structure(&[one], (0.005, 0.0), (1, 0.5));
+            all.memory(true).unwrap()
+        };
+        assert!(!ramped(0.0).is_sure(), "{:?}", ramped(0.0));
+        let size = ramped(2.0).size().0;
+        assert!((size - 2.0).abs() < 0.4, "{size}");
     }
 
     #[test]
