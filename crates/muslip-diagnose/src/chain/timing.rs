@@ -4,9 +4,9 @@ use super::correct::Lateness;
 use super::untold::Untold;
 use crate::audit::{Audit, Shown, Timing as Late};
 use crate::constants::{
-    ALIKE_LATE, ALIKE_LATE_S, AUDIT_REACH, FAR_BETTER, HEARD_S, IN_STEP_S,
-    LEAST_BRAKE_EARLY_IN_STEP_S, LEAST_BRAKE_EARLY_S, LEAST_DRAG_LATE_S, LEAST_STDS_TOLD,
-    UNKNOWN_STDS, VAGUE_AUDIT_S, VAGUE_S,
+    ALIKE_LATE, ALIKE_LATE_S, AUDIT_REACH, FAR_BETTER, HEARD_S, IN_STEP_S, LATE_STDS,
+    LEAST_BRAKE_EARLY_IN_STEP_S, LEAST_BRAKE_EARLY_S, LEAST_DRAG_LATE_S,
+    LEAST_DRAG_LATE_UNCHAINED_S, LEAST_STDS_TOLD, UNKNOWN_STDS, VAGUE_AUDIT_S, VAGUE_S,
 };
 
 /// Shifts are refined so often at most.
@@ -44,6 +44,16 @@ fn in_step(late: Late) -> bool {
     late.value.abs() < IN_STEP_S + 2.0 * late.std
 }
 
+/// Least lateness in s, known so well, that is left to be explained: what loggers and filters are out of step by unseen; where
+/// none shows that there are such, what stands out of its own error.
+fn least_left_s(chain_shows: bool, std: f64) -> f64 {
+    if chain_shows {
+        LEAST_DRAG_LATE_S
+    } else {
+        (LATE_STDS * std).clamp(LEAST_DRAG_LATE_UNCHAINED_S, LEAST_DRAG_LATE_S)
+    }
+}
+
 impl Timing {
     /// A channel's lateness against the drag as recorded.
     #[must_use]
@@ -67,15 +77,17 @@ impl Timing {
         let asked = &all[..if late_receiver { 2 } else { 3 }];
         // A brake alone says as little of the drag as the drag does of it.
         let speed = [self.wheel, self.vehicle].iter().any(|l| known(&l));
-        let told = asked.iter().filter(known).map(|l| -l.value);
-        let late = told.fold(f64::INFINITY, f64::min);
+        let told = asked.iter().filter(known);
+        let least = told.max_by(|a, b| a.value.total_cmp(&b.value))?;
+        let late = -least.value;
         let alike =
             |l: &Late| (-l.value - late).abs() < ALIKE_LATE * late + ALIKE_LATE_S + 2.0 * l.std;
         let heard = |l: &&Late| l.std < HEARD_S;
         if chain_shows && all.iter().filter(known).count() < 2 {
             return None;
         }
-        (speed && late > LEAST_DRAG_LATE_S && asked.iter().filter(heard).all(alike)).then_some(late)
+        let stands_out = late > least_left_s(chain_shows, least.std);
+        (speed && stands_out && asked.iter().filter(heard).all(alike)).then_some(late)
     }
 
     /// Leaves the drag as late as it is against all others.
@@ -104,12 +116,14 @@ impl Timing {
     }
 
     /// Whether the wheel speed alone comes before the drag, and nothing shows a chain that would make it: a tyre does.
-    fn wheel_early(&self, chain_shows: bool) -> bool {
+    fn wheel_early(&self, chain: Shown) -> bool {
         let others = self.vehicle.std < VAGUE_S
             && in_step(self.vehicle)
             && (in_step(self.brake) || self.brake.std > HEARD_S);
         let known = self.wheel.std < VAGUE_S;
-        !chain_shows && others && known && self.wheel.value < -LEAST_DRAG_LATE_S
+        let least = least_left_s(chain.of_any, self.wheel.std);
+        let before_all = self.wheel.value < self.vehicle.value.min(0.0) - least;
+        !chain.of_wheel && others && known && before_all
     }
 
     /// Leaves the wheel speed as early as it is.
@@ -174,7 +188,7 @@ impl Timing {
         self.leave(drag.unwrap_or(0.0));
         let brake = other.map_or_else(|| self.brake_early(), |other| other.leaves_brake);
         let wheel = other.map_or_else(
-            || drag.is_none() && !brake && self.wheel_early(chain.of_wheel),
+            || drag.is_none() && !brake && self.wheel_early(chain),
             |other| other.wheel_left > 0.0,
         );
         if brake {
@@ -292,6 +306,11 @@ mod tests {
         let late = timing(-0.010, -0.011, -0.010).drag_late(false);
         assert!((late.unwrap() - 0.010).abs() < 1e-12);
         assert_eq!(timing(0.010, 0.011, 0.010).drag_late(false), None);
+        // By little: loggers do that, where there are such.
+        let little = timing(-0.0015, -0.0016, -0.0015);
+        assert_eq!(little.drag_late(false), Some(0.0015));
+        assert_eq!(little.drag_late(true), None);
+        assert_eq!(timing(-0.0011, -0.0016, -0.0015).drag_late(false), None);
         // Each logger out of step by its own: what the others are early by beyond the wheel is theirs.
         assert_eq!(timing(-0.010, -0.013, -0.014).drag_late(false), Some(0.010));
         assert_eq!(timing(-0.010, -0.018, -0.019).drag_late(false), None);
@@ -321,7 +340,17 @@ mod tests {
     #[test]
     fn a_wheel_that_alone_precedes_drag_and_vehicle_is_left_to_the_tyre() {
         let mut early = timing(-0.004, 0.001, 0.0);
-        assert!(early.wheel_early(false) && !early.wheel_early(true));
+        let of_vehicle = Shown {
+            of_any: true,
+            of_wheel: false,
+        };
+        let of_wheel = Shown {
+            of_wheel: true,
+            ..of_vehicle
+        };
+        let early_by = |timing: Timing| timing.wheel_early(Shown::default());
+        assert!(early_by(early.clone()) && early.wheel_early(of_vehicle));
+        assert!(!early.wheel_early(of_wheel));
         let untold = early.untold();
         (early.late.wheel, early.late.wheel_by_turn) = (-0.005, 0.001);
         assert_eq!(
@@ -334,13 +363,17 @@ mod tests {
         // A tyre's memory is as long as before; the channels' is not.
         assert_eq!(early.untold().drag_s, untold.drag_s);
         assert!(early.untold().channels_s < 1e-3 && untold.channels_s > 4e-3);
-        // By less than a logger is out of step, beside others that are, or a vehicle's speed that says nothing.
-        assert!(!timing(-0.0015, 0.0, 0.0).wheel_early(false));
-        assert!(!timing(-0.004, 0.005, 0.0).wheel_early(false));
-        assert!(!timing(-0.004, 0.0, 0.005).wheel_early(false));
+        // By less than a logger is out of step unseen, or than is known, beside others that are early, or a vehicle's speed
+        // that says nothing.
+        let little = timing(-0.0015, 0.0, 0.0);
+        assert!(early_by(little.clone()) && !little.wheel_early(of_vehicle));
+        assert!(!early_by(timing(-0.0011, 0.0, 0.0)));
+        assert!(!early_by(timing(-0.0015, -0.0011, 0.0)));
+        assert!(!early_by(timing(-0.004, 0.005, 0.0)));
+        assert!(!early_by(timing(-0.004, 0.0, 0.005)));
         let mut vague = timing(-0.004, 0.0, 0.0);
         vague.vehicle.std = 0.003;
-        assert!(!vague.wheel_early(false));
+        assert!(!early_by(vague));
         // Not alone: the brake is.
         let mut with_brake = timing(-0.004, 0.0, -0.025);
         assert_eq!(
