@@ -301,7 +301,15 @@ impl<'a> Screen<'a> {
         for (ids, free) in parts(data, &wanted, free) {
             let wanted = |id: Id| ids.contains(&id);
             let (model, extra) = (&so_far.model, &so_far.extra);
-            let table = table(data, model, &slopes, &found, extra, free, &wanted);
+            let table = table(
+                data,
+                model,
+                (&slopes, &slopes.force),
+                &found,
+                extra,
+                free,
+                &wanted,
+            );
             scored.add(data, before.beside(), table);
         }
         Self {

@@ -67,12 +67,12 @@ fn plain(data: &Data, model: &Model, run: usize) -> Triple {
     values(rows_of(data, model, run))
 }
 
-/// All columns of a campaign about a model.
+/// All columns of a campaign about a model; the chain's nuisances are of its slopes and, in the levels, of a force in N.
 #[must_use]
 pub fn table(
     data: &Data,
     model: &Model,
-    slopes: &Slopes,
+    chain: (&Slopes, &[Vec<f64>]),
     evidence: &[Residuals],
     extra: &[Dependence],
     free: &[Dependence],
@@ -96,7 +96,7 @@ pub fn table(
             }
             OfRun {
                 columns: all.iter().map(|own| means(data, run, own)).collect(),
-                nuisances: nuisances(data, model, slopes, run),
+                nuisances: nuisances(data, model, chain, run),
                 // What candidates change.
                 here: (!starts.is_empty()).then(|| all.swap_remove(0)),
             }

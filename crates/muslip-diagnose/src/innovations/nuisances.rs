@@ -80,6 +80,8 @@ struct Chain<'a> {
     model: &'a Model,
     series: &'a Series,
     slopes: &'a Slopes,
+    /// The force in the levels, N.
+    force: Vec<f64>,
     run: usize,
     /// Whether the model's force passes a filter.
     is_filtered: bool,
@@ -92,7 +94,12 @@ struct Chain<'a> {
 type Entry<'a> = &'a dyn Fn(usize) -> f64;
 
 impl<'a> Chain<'a> {
-    fn new(data: &'a Data, model: &'a Model, slopes: &'a Slopes, run: usize) -> Self {
+    fn new(
+        data: &'a Data,
+        model: &'a Model,
+        (slopes, force): (&'a Slopes, &[Vec<f64>]),
+        run: usize,
+    ) -> Self {
         let series = &data.series[run];
         let finite = |rate: &[f64]| rate.iter().map(|x| finite_or_zero(*x)).collect();
         Self {
@@ -100,6 +107,7 @@ impl<'a> Chain<'a> {
             model,
             series,
             slopes,
+            force: quiet_force(series, &force[run]),
             run,
             is_filtered: is_filtered(&data.catalogue, model),
             wheel_rate: finite(&series.wheel.rate),
@@ -238,8 +246,7 @@ impl<'a> Chain<'a> {
 
     /// The drag smoothed, where it is integrated.
     fn by_drag(&self, reach: f64) -> Triple {
-        let force = quiet_force(self.series, &self.slopes.force[self.run]);
-        let level = self.smoothed_away(&force, reach);
+        let level = self.smoothed_away(&self.force, reach);
         let lever = -self.data.context.radius;
         self.columns([None, Some(&|k| lever * level[k]), Some(&|k| level[k])])
     }
@@ -266,8 +273,7 @@ impl<'a> Chain<'a> {
             return Triple::default();
         };
         let radius = self.data.context.radius;
-        let force = quiet_force(self.series, &self.slopes.force[self.run]);
-        let acting: Vec<f64> = core::iter::zip(&torque.smooth, &force)
+        let acting: Vec<f64> = core::iter::zip(&torque.smooth, &self.force)
             .map(|(torque, force)| torque - radius * force)
             .collect();
         let mean = self.smoothed(&acting, reach);
@@ -281,16 +287,20 @@ impl<'a> Chain<'a> {
         if !(late > LEAST_POLE_S) || s.vehicle_balance.is_empty() {
             return Triple::default();
         }
-        let force = quiet_force(s, &self.slopes.force[self.run]);
-        let force: Vec<f64> = force.into_iter().map(finite_or_zero).collect();
+        let force: Vec<f64> = self.force.iter().map(|f| finite_or_zero(*f)).collect();
         let level = poles_for_delay(&s.time, &s.dt, &force, late, poles);
         self.columns([None, None, Some(&|k| level[k])])
     }
 }
 
 /// The columns on one run as means over blocks, with the prior standard deviations of their coefficients.
-pub fn nuisances(data: &Data, model: &Model, slopes: &Slopes, run: usize) -> Vec<(f64, Triple)> {
-    let chain = Chain::new(data, model, slopes, run);
+pub fn nuisances(
+    data: &Data,
+    model: &Model,
+    of_model: (&Slopes, &[Vec<f64>]),
+    run: usize,
+) -> Vec<(f64, Triple)> {
+    let chain = Chain::new(data, model, of_model, run);
     let s = chain.series;
     let (wheel_rate, speed_rate) = (&chain.wheel_rate, &chain.speed_rate);
     let wheel_second = second(wheel_rate, &s.time);
@@ -418,7 +428,7 @@ mod tests {
             let [before, after] = [&plain, &less].map(|data| rows_of(data, &model, 0).tyre);
             let moved = plain.blocks[0][0].mean_of(|k| after[k] - before[k]);
             let slopes = Slopes::new(&plain, &model);
-            let chain = Chain::new(&plain, &model, &slopes, 0);
+            let chain = Chain::new(&plain, &model, (&slopes, &slopes.force), 0);
             let [column, ..] = chain.columns([Some(&change), None, None]);
             let most = moved.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
             assert!(most > 50.0, "{id:?} {most}");

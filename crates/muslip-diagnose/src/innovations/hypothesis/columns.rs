@@ -27,9 +27,14 @@ pub fn bounds(data: &Data, model: &Model) -> Vec<(f64, f64)> {
 }
 
 /// Columns of a model that nothing is to be added to.
-pub fn table_of(data: &Data, model: &Model, slopes: &Slopes, extra: &[Dependence]) -> Table {
+pub fn table_of(
+    data: &Data,
+    model: &Model,
+    chain: (&Slopes, &[Vec<f64>]),
+    extra: &[Dependence],
+) -> Table {
     let none = vec![Residuals::default(); data.series.len()];
-    table(data, model, slopes, &none, extra, &[], &|_| false)
+    table(data, model, chain, &none, extra, &[], &|_| false)
 }
 
 /// Inner products of all columns of a table under this noise, by balance, run and half.

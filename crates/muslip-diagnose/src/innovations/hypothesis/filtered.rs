@@ -1,11 +1,13 @@
-//! Noise of all balances with the filters that it makes: made once, for many models are weighed under one noise.
+//! Noise of all balances with the filters that it makes, and the force that the chain's nuisances of the levels are of: made
+//! once, for many models are weighed under one noise.
 
 use std::sync::Arc;
 
 use crate::data::Data;
 use crate::innovations::gram::Filters;
-use crate::innovations::noise::BalanceParts;
+use crate::innovations::noise::{BalanceParts, Slopes};
 use crate::innovations::whiten::whiteners;
+use crate::model::Model;
 
 fn filters(data: &Data, parts: &BalanceParts) -> Arc<Filters> {
     Arc::new(whiteners(&parts.courses(data, 1), &parts.sizes()))
@@ -16,6 +18,8 @@ fn filters(data: &Data, parts: &BalanceParts) -> Arc<Filters> {
 pub struct Noise {
     parts: Vec<BalanceParts>,
     filters: Vec<Arc<Filters>>,
+    /// The force that nuisances of the levels are of, where that is another model's.
+    held: Option<Arc<Vec<Vec<f64>>>>,
 }
 
 impl Noise {
@@ -26,7 +30,34 @@ impl Noise {
         Self {
             filters: filters.collect(),
             parts,
+            held: None,
         }
+    }
+
+    /// The same, the chain's nuisances of the levels held to the force of a model. A nuisance that is fitted takes a share of its
+    /// column, so a parameter that changes the column changes what is left by as much, which the column of the parameter itself
+    /// does not say: the way it points leads elsewhere.
+    #[must_use]
+    pub fn held_to(self, data: &Data, model: &Model) -> Self {
+        Self {
+            held: Some(Arc::new(Slopes::new(data, model).force)),
+            ..self
+        }
+    }
+
+    /// The same by parts of other sizes.
+    #[must_use]
+    pub fn of_parts(&self, data: &Data, parts: Vec<BalanceParts>) -> Self {
+        Self {
+            held: self.held.clone(),
+            ..Self::new(data, parts)
+        }
+    }
+
+    /// The force that nuisances of the levels are of beside a model.
+    #[must_use]
+    pub fn force_of_levels<'a>(&'a self, own: &'a Slopes) -> &'a [Vec<f64>] {
+        self.held.as_ref().map_or(&own.force, |held| held)
     }
 
     /// Its parts, balance by balance.

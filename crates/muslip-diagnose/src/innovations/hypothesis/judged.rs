@@ -54,7 +54,8 @@ impl Judged {
     pub fn unseen_under(&self, data: &Data, noise: &Noise) -> Option<Unseen> {
         let table = self.table.clone().unwrap_or_else(|| {
             let slopes = Slopes::new(data, &self.model);
-            Arc::new(table_of(data, &self.model, &slopes, &self.extra))
+            let force = noise.force_of_levels(&slopes);
+            Arc::new(table_of(data, &self.model, (&slopes, force), &self.extra))
         });
         let grams = table_grams(data, noise, &table);
         unseen(data, &self.model, &table, &grams)

@@ -50,10 +50,12 @@ impl Beside {
     /// Of a judged model.
     #[must_use]
     pub fn new(data: &Data, judged: &Judged) -> Self {
+        let fitted = Noise::new(data, no_less_plausible(&judged.parts));
+        let fitted = fitted.held_to(data, &judged.model);
         Self {
             loss: judged.loss,
-            fitted: Noise::new(data, no_less_plausible(&judged.parts)),
-            at_sensors: Noise::new(data, capped(&judged.parts)),
+            at_sensors: fitted.of_parts(data, capped(&judged.parts)),
+            fitted,
         }
     }
 }
@@ -72,16 +74,19 @@ pub fn judge(
         Guess::None => Known::Nothing(effort),
         Guess::Sizes(parts) => Known::Sizes(parts),
         Guess::Under(other) => {
-            held = Noise::new(data, other.parts.clone());
+            held = Noise::new(data, other.parts.clone()).held_to(data, &other.model);
             Known::Noise(&held)
         }
     };
-    Place::new(data, start.clone(), extra, known)?.at_its_best(data, extra, effort, false)
+    Place::new(data, start.clone(), extra, known)?
+        .descended(data, extra, effort.steps)?
+        .at_its_best(data, extra, effort, false)
 }
 
 /// Judges a model to which something is added. Noise that was fitted without it may have swallowed it: its parameters are
-/// first sought where the noise is no larger than the sensors make plausible. Where that leads nowhere, they are sought
-/// from the start under the noise as it was fitted, which may leave them there: what is added is no worse than nothing.
+/// first sought where the noise is no larger than the sensors make plausible, and the noise is fitted to them there. Where that
+/// leads nowhere, they are sought from the start under the noise as it was fitted, which may leave them there: what is added
+/// is no worse than nothing.
 #[must_use]
 pub fn judge_added(
     data: &Data,
@@ -90,10 +95,15 @@ pub fn judge_added(
     beside: &Beside,
     effort: Effort,
 ) -> Option<Judged> {
-    let place = |noise| Place::new(data, start.clone(), extra, Known::Noise(noise));
+    let sought_under = |noise| {
+        Place::new(data, start.clone(), extra, Known::Noise(noise))?.descended(
+            data,
+            extra,
+            effort.steps,
+        )
+    };
     let judged = |place: Place| place.at_its_best(data, extra, effort, true);
-    let sought = place(&beside.at_sensors)
-        .and_then(|place| place.descended(data, extra, effort.steps))
+    let sought = sought_under(&beside.at_sensors)
         .and_then(|place| place.under(data, &beside.fitted))
         .and_then(judged);
     if sought
@@ -102,7 +112,7 @@ pub fn judge_added(
     {
         return sought;
     }
-    let plain = place(&beside.fitted).and_then(judged);
+    let plain = sought_under(&beside.fitted).and_then(judged);
     match (sought, plain) {
         (Some(a), Some(b)) => Some(if a.loss < b.loss { a } else { b }),
         (a, b) => a.or(b),

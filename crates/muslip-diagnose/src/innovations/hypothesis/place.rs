@@ -42,7 +42,7 @@ pub struct Place {
     within: Within,
     /// Twice the negative log likelihood here, free dependences and the chain's nuisances fitted.
     here: f64,
-    /// By what the noise enters is another model's, whatever this one is.
+    /// By what the noise and nuisances of the levels enter is another model's, whatever this one is.
     noise_held: bool,
 }
 
@@ -128,7 +128,8 @@ impl Place {
             Known::Sizes(old) => Noise::new(data, with_sizes(parts(data, &slopes), old)),
             Known::Noise(old) => old.clone(),
         };
-        let table = Arc::new(table_of(data, &model, &slopes, extra));
+        let force = noise.force_of_levels(&slopes);
+        let table = Arc::new(table_of(data, &model, (&slopes, force), extra));
         let mut by_balance = grams_by_balance(&noise, &table);
         if let Known::Nothing(effort) = known {
             for _ in 0..SWEEPS {
@@ -268,9 +269,9 @@ impl Place {
         self.model.with(&p)
     }
 
-    /// What is to be said of the model once its parameters, then the noise, then its parameters again are at their
-    /// best; without the latter two where those are worse: sizes of the noise that are the best of part of the blocks need
-    /// not be the best of all. `added` is whether only the noise of balances that its last term touches may change.
+    /// What is to be said of the model once the noise, then its parameters are at their best beside where they have been
+    /// sought; without these two where they are worse: sizes of the noise that are the best of part of the blocks need not be the
+    /// best of all. `added` is whether only the noise of balances that its last term touches may change.
     pub fn at_its_best(
         self,
         data: &Data,
@@ -278,14 +279,13 @@ impl Place {
         effort: Effort,
         added: bool,
     ) -> Option<Judged> {
-        let sought = self.descended(data, extra, effort.steps)?;
-        let refitted = sought
+        let refitted = self
             .clone()
             .refitted(data, extra, effort, added)
             .and_then(|place| place.descended(data, extra, effort.steps.div_ceil(2)));
         match refitted {
-            Some(refitted) if refitted.restricted_loss() < sought.restricted_loss() => refitted,
-            _ => sought,
+            Some(refitted) if refitted.restricted_loss() < self.restricted_loss() => refitted,
+            _ => self.descended(data, extra, effort.steps)?,
         }
         .judged(data, extra)
     }
@@ -377,5 +377,25 @@ mod tests {
         assert!(after < before, "{after} {before}");
         // The most that a few readings' fit may be off by.
         assert!(refitted.to_gain() < 5.0, "{}", refitted.to_gain());
+    }
+
+    #[test]
+    fn nuisances_of_the_wheel_s_level_held_to_one_model_are_alike_beside_another() {
+        let data = stop(toy::Noise::FINE_WHEEL, 4);
+        let base = settled(&data);
+        let mut other = base.model.clone();
+        other.base[0] += 0.05;
+        let squares = |model: &Model, noise: &Noise| -> Vec<f64> {
+            let place = Place::new(&data, model.clone(), &[], Known::Noise(noise)).unwrap();
+            let mut parts = noise.parts().iter();
+            let wheel = parts.position(|own| own.balance == Balance::Wheel).unwrap();
+            let products = total(&place.by_balance[wheel]).products;
+            let nuisances = linear(&place.table, model).into_iter();
+            nuisances.map(|i| products[(i, i)]).collect()
+        };
+        let free = Noise::new(&data, base.parts.clone());
+        let held = free.clone().held_to(&data, &base.model);
+        assert_eq!(squares(&other, &held), squares(&base.model, &held));
+        assert_ne!(squares(&other, &free), squares(&base.model, &free));
     }
 }
