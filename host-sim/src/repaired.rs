@@ -341,8 +341,7 @@ impl<'a> Coupling<'a> {
             &data.series[0],
             &data.context,
         );
-        let force = state.contact.unwrap_or(state.force);
-        let mut now = force.last().copied().unwrap_or(0.0);
+        let mut force = state.contact.unwrap_or(state.force);
         let acting: Vec<_> = self
             .repaired
             .corrections
@@ -357,12 +356,18 @@ impl<'a> Coupling<'a> {
         if !acting.is_empty() {
             let levers = Levers::new(data, &self.tyre);
             for correction in acting {
-                if let Ok(added) = correction.apply(data, &levers, 0) {
-                    now += added.last().copied().unwrap_or(0.0);
+                let added = correction.apply(data, &levers, 0).unwrap_or_default();
+                for (force, added) in force.iter_mut().zip(added) {
+                    *force += added;
                 }
             }
         }
-        now
+        if !self.repaired.corrections.is_empty() {
+            let left = self.repaired.leave_to_base(data, &self.tyre, &mut force);
+            // The base law was checked with the model.
+            left.unwrap_or_default();
+        }
+        force.last().copied().unwrap_or(0.0)
     }
 
     /// Puts an instant at the end of the run so far.

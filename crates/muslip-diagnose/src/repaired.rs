@@ -11,6 +11,7 @@ use crate::data::{Catalogue, Data};
 use crate::mechanism::{Context, Parameter};
 use crate::model::{Model, Term, tyre};
 pub use crate::noise::Likelihood;
+use crate::number::finite_or_zero;
 use crate::prepare::prepare;
 use crate::series::Series;
 use crate::variable::Variable;
@@ -42,8 +43,8 @@ pub struct RepairedParameter {
     pub unit: String,
 }
 
-/// An empirical correction: hat functions of a variable. Outside its domain the nearest knot's value holds: the law beside it was
-/// fitted with it, and is wrong without it.
+/// An empirical correction: hat functions of a variable. Outside its knots the nearest one's value holds, for the law beside it was
+/// fitted with it and is wrong without it; where nothing else stands beside that law, the base law takes over from both.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Correction {
     /// Variable.
@@ -464,6 +465,7 @@ impl Repaired {
                     *f += a;
                 }
             }
+            self.leave_to_base(data, &model, &mut force)?;
         }
         let mut last = 0.0;
         for f in &mut force {
@@ -484,6 +486,35 @@ impl Repaired {
                 .map(|f| if f.is_finite() { *f } else { 0.0 })
                 .collect(),
         })
+    }
+
+    /// Leaves a force in N by a model with corrections, along the first run, to the base law where that run goes beyond the knots
+    /// of one of them; not where the model has a mechanism, which the base law has not.
+    ///
+    /// # Errors
+    /// [`RepairedError`] where the base law cannot be run.
+    pub fn leave_to_base(
+        &self,
+        data: &Data,
+        model: &Model,
+        force: &mut [f64],
+    ) -> Result<(), RepairedError> {
+        if !model.terms.is_empty() {
+            return Ok(());
+        }
+        let alone = self.tyre_model(&data.catalogue, Which::Base)?;
+        let (series, p) = (&data.series[0], alone.vector());
+        let base = tyre(&data.catalogue, &alone, &p, series, &data.context).force;
+        for correction in &self.corrections {
+            let known = correction.known(data, 0);
+            let unknown = known.into_iter().map(|known| 1.0 - known);
+            for ((force, base), unknown) in force.iter_mut().zip(&base).zip(unknown) {
+                if unknown > 0.0 {
+                    *force += unknown * (base - *force);
+                }
+            }
+        }
+        Ok(())
     }
 }
 
@@ -519,12 +550,10 @@ impl Correction {
         let action = Action::parse(&self.acts_on)
             .ok_or_else(|| RepairedError::BadValue(format!("acts_on = \"{}\"", self.acts_on)))?;
         let n = data.series[run].len();
-        let mut variables = Variable::all(data).into_iter();
-        let Some(variable) = variables.find(|v| v.key(data) == self.variable) else {
+        let Some(values) = self.variable_on(data, run) else {
             // A column that this recording does not have: no correction.
             return Ok(vec![0.0; n]);
         };
-        let values = variable.values(data, run);
         Ok((0..n)
             .map(|k| {
                 let mut amount = match hat(&self.knots, values[k]) {
@@ -542,6 +571,30 @@ impl Correction {
                 if added.is_finite() { added } else { 0.0 }
             })
             .collect())
+    }
+
+    /// The variable on one run; nothing where the recording does not have it.
+    fn variable_on(&self, data: &Data, run: usize) -> Option<Vec<f64>> {
+        let mut variables = Variable::all(data).into_iter();
+        let variable = variables.find(|v| v.key(data) == self.variable)?;
+        Some(variable.values(data, run))
+    }
+
+    /// How much of it is known at each sample of a run, 0 to 1: all among its knots, nothing farther from them than the last two
+    /// are apart, nor where the recording does not have the variable.
+    fn known(&self, data: &Data, run: usize) -> Vec<f64> {
+        let all = |share: f64| vec![share; data.series[run].len()];
+        let Some(values) = self.variable_on(data, run) else {
+            return all(0.0);
+        };
+        let ([first, second, ..], [.., before, last]) = (&self.knots[..], &self.knots[..]) else {
+            return all(1.0);
+        };
+        let beyond = |u: f64| ((first - u) / (second - first)).max((u - last) / (last - before));
+        let known = values.into_iter().map(|u| 1.0 - beyond(u));
+        known
+            .map(|share| finite_or_zero(share).clamp(0.0, 1.0))
+            .collect()
     }
 }
 
@@ -578,5 +631,59 @@ mod tests {
         assert!(!below.is_empty() && !above.is_empty());
         assert!(below.iter().all(|share| (share + 0.3).abs() < 1e-9));
         assert!(above.iter().all(|share| (share - 0.2).abs() < 1e-9));
+    }
+
+    #[test]
+    fn beyond_what_corrections_were_made_from_the_base_law_takes_over() {
+        let data = stop(Noise::NONE, 7);
+        let law = settled(&data).model.base;
+        let slip = Variable::Slip.values(&data, 0);
+        let most = slip.iter().copied().fold(0.0, f64::max);
+        let correction = |variable: &str| Correction {
+            variable: variable.to_owned(),
+            acts_on: "friction".to_owned(),
+            form: String::new(),
+            knots: vec![0.0, 0.1 * most, 0.2 * most],
+            values: vec![0.1, 0.3, 0.2],
+            harmonics: Vec::new(),
+        };
+        let repaired = |corrections: &[Correction]| Repaired {
+            base_alone: law.clone(),
+            base: core::iter::once(law[0] - 0.5)
+                .chain(law[1..].to_vec())
+                .collect(),
+            corrections: corrections.to_vec(),
+            context: data.context.clone(),
+            ..Repaired::default()
+        };
+        let force = |corrections: &[Correction], which| {
+            let prediction = repaired(corrections).predict_from(&data, which, false);
+            prediction.unwrap().drag_force_n
+        };
+        let by_slip = [correction("slip")];
+        let [base, alone] = [Which::Base, Which::Repaired].map(|which| force(&[], which));
+        let corrected = force(&by_slip, Which::Repaired);
+        let levers = Levers::new(
+            &data,
+            &repaired(&[])
+                .tyre_model(&data.catalogue, Which::Repaired)
+                .unwrap(),
+        );
+        let added = by_slip[0].apply(&data, &levers, 0).unwrap();
+        let mut seen = [0; 2];
+        for k in 0..slip.len() {
+            let share = slip[k] / most;
+            if share > 0.31 {
+                assert!((corrected[k] - base[k]).abs() < 1e-9);
+                seen[0] += 1;
+            } else if (0.0..0.2).contains(&share) {
+                assert!((corrected[k] - alone[k] - added[k]).abs() < 1e-9);
+                seen[1] += 1;
+            }
+        }
+        assert!(seen.iter().all(|seen| *seen > 50), "{seen:?}");
+        // Nor is anything known of a column that the recording does not have.
+        let unknown = force(&[correction("temperature_c")], Which::Repaired);
+        assert!(unknown.iter().zip(&base).all(|(a, b)| (a - b).abs() < 1e-9));
     }
 }

@@ -243,7 +243,7 @@ fn findings(diagnosis: &Diagnosis, views: &Views) -> Section {
         if let (Some(low), Some(high)) = (correction.knots.first(), correction.knots.last()) {
             blocks.push(Block::Paragraph(format!(
                 "The repaired model corrects the {} by a table of {} values over {}, {}; outside, the \
-                 nearest value holds.",
+                 base law takes over, unless a mechanism stands beside it.",
                 spoken(&correction.acts_on),
                 correction.knots.len(),
                 variable(&correction.variable),
