@@ -135,9 +135,9 @@ fn places(count: usize, lag: usize) -> core::ops::Range<usize> {
     lag..count.saturating_sub(lag)
 }
 
-/// Size of a second difference as its product counts.
-fn size_of(x: &[f64], factor: &[f64], k: usize, lag: usize) -> f64 {
-    second_difference(x, k, lag).abs() * factor[k].abs().sqrt()
+/// Size of a second difference as its product counts, with the factor on that.
+fn size_of(difference: f64, factor: f64) -> f64 {
+    difference.abs() * factor.abs().sqrt()
 }
 
 /// Size beyond which a second difference over a lag is that of a motion that breaks off.
@@ -149,7 +149,7 @@ fn size_of_breaks(pairs: &[Pair], lag: usize, pick: fn(&Pair) -> &[f64]) -> f64 
             // Neighbours say the same over a long lag.
             let apart = places(x.len(), lag).step_by(lag.div_ceil(4));
             let counts = apart.filter(|k| pair.factor[*k] != 0.0);
-            counts.map(move |k| size_of(x, &pair.factor, k, lag))
+            counts.map(move |k| size_of(second_difference(x, k, lag), pair.factor[k]))
         })
         .collect();
     let usual = median_in_place(&mut sizes);
@@ -211,9 +211,7 @@ pub fn structure(
                     sum[1] += 0.5 * a * a * f;
                     sum[2] += 0.5 * b * b * f;
                     sum[3] += 1.0;
-                    let [size_a, size_b] =
-                        [&pair.a, &pair.b].map(|x| size_of(x, &pair.factor, k, lag));
-                    *breaks_off |= size_a > most_a || size_b > most_b;
+                    *breaks_off |= size_of(a, f) > most_a || size_of(b, f) > most_b;
                 }
             }
             blocks.push(sums);
