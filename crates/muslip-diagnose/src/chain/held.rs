@@ -1,54 +1,150 @@
 //! Channels that hold their last reading, drawn as straight lines between the readings.
 
+use core::ops::Range;
+
+use crate::audit::hold::hold;
 use crate::campaign::Run;
 use crate::constants::LEAST_REPEATED;
+use crate::series::GAP_STEPS;
+use crate::smooth::median_in_place;
 
-/// A held channel with every reading at the middle of the time for which it stands, and straight lines in between:
-/// as late on average as the staircase, without its steps. Any other channel as it is.
+/// A stand of so many typical ones is a standstill, or a speed that does not change.
+const LONG_STAND: f64 = 3.0;
+/// Fewest stands of a channel that is held.
+const LEAST_STANDS: usize = 20;
+
+/// A held channel with every reading at the middle of the time for which it stands, and straight lines in between, and on
+/// to the ends: as late on average as the staircase, without its steps. Any other channel as it is.
 fn unheld(time: &[f64], x: &[f64]) -> Vec<f64> {
-    let moves = |k: usize| x[k] != x[k - 1];
-    let n = x.len();
-    // Where it moves at all: a standstill repeats without being held.
-    let mut stands: Vec<(usize, usize)> = Vec::new();
-    let mut from = 0;
-    for k in 1..n {
-        if moves(k) {
-            stands.push((from, k));
-            from = k;
-        }
-    }
-    stands.push((from, n));
-    let typical = {
-        let mut lengths: Vec<f64> = stands.iter().map(|(a, b)| (b - a) as f64).collect();
-        crate::smooth::median_in_place(&mut lengths)
-    };
-    let short = |(a, b): (usize, usize)| ((b - a) as f64) <= 3.0 * typical;
-    let (mut repeated, mut moving) = (0.0, 0.0);
-    for &stand in stands.iter().filter(|s| short(**s)) {
-        repeated += (stand.1 - stand.0 - 1) as f64;
-        moving += (stand.1 - stand.0) as f64;
-    }
-    if !(repeated > LEAST_REPEATED * moving) || stands.len() < 20 {
-        return x.to_vec();
-    }
-    let middle = |(a, b): (usize, usize)| 0.5 * (time[a] + time[b - 1]);
     let mut out = x.to_vec();
-    for pair in stands.windows(2) {
-        if !short(pair[0]) || !short(pair[1]) {
-            continue;
-        }
-        let (a, b) = (middle(pair[0]), middle(pair[1]));
-        let (from, to) = (x[pair[0].0], x[pair[1].0]);
-        if !(b > a) || !from.is_finite() || !to.is_finite() {
-            continue;
-        }
-        for k in pair[0].0..pair[1].1 {
-            if time[k] >= a && time[k] <= b {
-                out[k] = from + (to - from) * (time[k] - a) / (b - a);
-            }
+    if !is_held(&stands(x, 0..x.len())) {
+        return out;
+    }
+    let period = hold(time, x).map(|hold| hold.period_s);
+    let mut steps: Vec<f64> = time.windows(2).map(|w| w[1] - w[0]).collect();
+    let step = median_in_place(&mut steps);
+    for part in parts(time, GAP_STEPS * step) {
+        let stands = stands(x, part.clone());
+        if stands.len() > 1 {
+            draw(
+                time,
+                x,
+                part,
+                &readings(time, step, &stands, period),
+                &mut out,
+            );
         }
     }
     out
+}
+
+/// Stretches of a recording without a step longer than this.
+fn parts(time: &[f64], longest: f64) -> Vec<Range<usize>> {
+    let ends = (1..time.len()).filter(|k| time[*k] - time[*k - 1] > longest);
+    let mut parts = Vec::new();
+    let mut from = 0;
+    for end in ends.chain([time.len()]) {
+        parts.push(from..end);
+        from = end;
+    }
+    parts
+}
+
+/// Stretches of samples that repeat the one before.
+fn stands(x: &[f64], part: Range<usize>) -> Vec<Range<usize>> {
+    let mut stands = Vec::new();
+    let mut from = part.start;
+    for k in part.start + 1..part.end {
+        if x[k] != x[k - 1] {
+            stands.push(from..k);
+            from = k;
+        }
+    }
+    stands.push(from..part.end);
+    stands
+}
+
+/// Whether a channel repeats its readings where it moves at all: a standstill repeats without being held.
+fn is_held(stands: &[Range<usize>]) -> bool {
+    let mut lengths: Vec<f64> = stands.iter().map(|stand| stand.len() as f64).collect();
+    let typical = median_in_place(&mut lengths);
+    let moving = lengths
+        .iter()
+        .filter(|length| **length <= LONG_STAND * typical);
+    let (repeated, moving) = moving.fold((0.0, 0.0), |(repeated, moving), length| {
+        (repeated + length - 1.0, moving + length)
+    });
+    repeated > LEAST_REPEATED * moving && stands.len() >= LEAST_STANDS
+}
+
+/// Readings of a held channel: the middle of the time for which each stands, and a sample that has it. Where the `period` is
+/// known, a stand of several of them is as many readings that happen to be equal: as one, at the middle of all of them, an
+/// equal reading more or less would move the mean. Where it is not, a stand that is much longer than others is. The recording
+/// cuts the first and the last stand short: they are taken to be as long as the others, for a line to the middle of what is
+/// left would be up to twice too steep.
+fn readings(
+    time: &[f64],
+    step: f64,
+    stands: &[Range<usize>],
+    period: Option<f64>,
+) -> Vec<(f64, usize)> {
+    let stood = |stand: &Range<usize>| time[stand.end - 1] - time[stand.start] + step;
+    let inner = stands.get(1..stands.len().max(2) - 1).unwrap_or_default();
+    let mut lengths: Vec<f64> = inner.iter().map(stood).collect();
+    let one = period.unwrap_or_else(|| median_in_place(&mut lengths));
+    let mut readings = Vec::new();
+    for (at, stand) in stands.iter().enumerate() {
+        let stood = stood(stand);
+        let cut = at == 0 || at + 1 == stands.len();
+        let count = match period {
+            // How long it stood is known to a step.
+            Some(_) if cut => ((stood - step) / one).ceil(),
+            Some(_) => (stood / one).round(),
+            None if stood > LONG_STAND * one => (stood / one).round(),
+            None => 1.0,
+        };
+        let count = if count >= 1.0 { count } else { 1.0 };
+        let each = if cut {
+            one.max(stood / count)
+        } else {
+            stood / count
+        };
+        let begin = if at == 0 {
+            time[stand.start] + stood - count * each
+        } else {
+            time[stand.start]
+        };
+        for reading in 0..count as usize {
+            // The middle of the samples, half a step before the middle of the time to the next reading.
+            let middle = begin + (reading as f64 + 0.5) * each - 0.5 * step;
+            readings.push((middle, stand.start));
+        }
+    }
+    readings
+}
+
+/// Draws a part of a channel as straight lines between its readings, and along the first and the last of them on to its ends.
+fn draw(time: &[f64], x: &[f64], part: Range<usize>, readings: &[(f64, usize)], out: &mut [f64]) {
+    let mut at = 0;
+    for k in part {
+        while at + 2 < readings.len() && readings[at + 1].0 <= time[k] {
+            at += 1;
+        }
+        let [(a, from), (b, to)] = [readings[at], readings[at + 1]];
+        let (from, to) = (x[from], x[to]);
+        let value = from + (to - from) * (time[k] - a) / (b - a);
+        if !(b > a) || !value.is_finite() {
+            continue;
+        }
+        // What comes to rest does not turn round.
+        let nearest = if time[k] < a { from } else { to };
+        let beyond = time[k] < a || time[k] > b;
+        out[k] = if beyond && value * nearest <= 0.0 {
+            0.0
+        } else {
+            value
+        };
+    }
 }
 
 /// A run whose speeds are lines where they were held.
@@ -76,5 +172,78 @@ mod tests {
             assert!((line[k] - (20.0 - 3.0 * (time[k] - 0.008))).abs() < 1e-9);
         }
         assert_eq!(unheld(&time, &line)[10..290], line[10..290]);
+    }
+
+    #[test]
+    fn equal_readings_after_one_another_leave_the_mean_as_it_is() {
+        // A counter of whole steps, renewed every 9.3 ms, of a speed of 15 steps and a third.
+        let time: Vec<f64> = (0..3000).map(|k| 0.002 * f64::from(k)).collect();
+        let counted: Vec<f64> = time
+            .iter()
+            .map(|t| {
+                let window = (t / 0.0093).floor();
+                (15.333 * (window + 1.0)).floor() - (15.333 * window).floor()
+            })
+            .collect();
+        let drawn = unheld(&time, &counted);
+        let mean = |x: &[f64]| x[100..2900].iter().sum::<f64>() / 2800.0;
+        assert!((mean(&counted) - 15.333).abs() < 0.005);
+        assert!((mean(&drawn) - 15.333).abs() < 0.005, "{}", mean(&drawn));
+        // Nor does a gap in time draw a line across itself.
+        let paused: Vec<f64> = time
+            .iter()
+            .map(|t| t + if *t < 3.0 { 0.0 } else { 5.0 })
+            .collect();
+        let apart: Vec<f64> = counted
+            .iter()
+            .zip(&time)
+            .map(|(x, t)| if *t < 3.0 { *x } else { x + 40.0 })
+            .collect();
+        let drawn = unheld(&paused, &apart);
+        assert!(drawn[..1500].iter().all(|x| *x < 16.5));
+        assert!(drawn[1500..].iter().all(|x| *x > 54.5));
+    }
+
+    #[test]
+    fn a_speed_that_does_not_change_is_no_ramp_however_unevenly_it_is_renewed() {
+        // Every 0.1 s and up to 40 ms later: no period. It drives on, brakes to rest, and stands.
+        let time: Vec<f64> = (0..2500).map(|k| 0.004 * f64::from(k)).collect();
+        let speed = |t: f64| (20.0 - 8.0 * (t - 4.0).max(0.0)).max(0.0);
+        let held: Vec<f64> = time
+            .iter()
+            .map(|t| {
+                let uneven = |n: f64| 0.1 * n + 0.04 * (n * 2.399).sin().abs();
+                let n = (t / 0.1).floor();
+                speed(uneven(if uneven(n) <= *t { n } else { n - 1.0 }))
+            })
+            .collect();
+        assert!(hold(&time, &held).is_none());
+        let drawn = unheld(&time, &held);
+        for (t, x) in time.iter().zip(&drawn) {
+            let moves = *t > 3.9 && *t < 6.7;
+            assert!(moves || (x - speed(*t)).abs() < 1e-9, "{t}: {x}");
+        }
+    }
+
+    #[test]
+    fn a_reading_that_the_recording_cuts_short_stands_for_as_long_as_the_others() {
+        // Its first and its last reading stand for one sample of twenty-five.
+        let time: Vec<f64> = (0..527).map(|k| 0.004 * f64::from(k)).collect();
+        let truth = |k: i32| 20.0 - 3.0 * 0.004 * f64::from(k - 12);
+        let held: Vec<f64> = (0..527)
+            .map(|k: i32| truth(25 * ((k + 24) / 25) - 24 + 12))
+            .collect();
+        let line = unheld(&time, &held);
+        for (k, own) in line.iter().enumerate() {
+            let expected = truth(k as i32);
+            assert!((own - expected).abs() < 1e-9, "{k}: {own} {expected}");
+        }
+        // What comes to rest neither turns round nor goes on.
+        for last in [0.0, 0.02] {
+            let stops: Vec<f64> = held[..524].iter().map(|x| x - held[523] + last).collect();
+            let stopped = unheld(&time[..524], &stops);
+            assert!(stopped.iter().all(|x| *x >= 0.0), "{:?}", &stopped[490..]);
+            assert!(stopped[523] < 0.16, "{}", stopped[523]);
+        }
     }
 }
