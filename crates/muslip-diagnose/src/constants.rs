@@ -27,13 +27,24 @@ pub const LEAST_T_OF_AGREED: f64 = 3.0;
 /// the most of what all runs show alike: six with a t of three are worth three nats, and a name costs seven.
 pub const LEAST_GAIN_OF_AGREED: f64 = -2.0;
 /// As [`LEAST_T_OF_AGREED`]: least logarithm by which the name lowers the mean square error of the drag.
-pub const AGREED_PREDICTED: f64 = 0.15;
+pub const AGREED_PREDICTED: f64 = PREDICTED_APART;
+/// As [`LEAST_T_OF_AGREED`], from which a name need not lower the mean square error of the drag by as much as others, only not
+/// enlarge it.
+pub const LEAST_T_OF_SURE: f64 = 5.0;
 /// As [`LEAST_T_OF_AGREED`]: fewest unseen runs. With fewer a t of three is chance.
 pub const FEWEST_RUNS_AGREED: usize = 4;
 /// Gain on all unseen runs together, nats, beyond which a measuring chain leaves nothing: with a t of [`LEAST_T_NOT_FED`] or
 /// more, or without one where hardly any run speaks against it, what does not stand by less gained at most 194 on 220
 /// development campaigns with nothing missing.
 pub const LARGE_GAIN_ON_UNSEEN: f64 = 300.0;
+/// As [`LARGE_GAIN_ON_UNSEEN`], of what no measuring chain leaves and predicts the drag better by [`PREDICTED_APART`], with a t
+/// of [`LEAST_T_NOT_FED`].
+pub const LARGE_GAIN_NOT_FED: f64 = 60.0;
+/// Gain on all unseen runs together, nats, at both levels of the noise, from which a lag of the brake is one however its
+/// reading and the other channels are timed: of 490 development campaigns that lack nothing none gains more than 34.
+pub const LARGE_GAIN_OF_BRAKE: f64 = 40.0;
+/// As [`LARGE_GAIN_OF_BRAKE`], in times what the least effect worth a name gains: gains grow with the readings.
+pub const WORTHS_OF_BRAKE: f64 = 3.0;
 /// As [`LARGE_GAIN_ON_UNSEEN`], in times what the least effect worth a name gains: gains grow with the readings.
 pub const LARGE_TO_WORTH: f64 = 10.0;
 /// Least t of a name that all recordings together make clearly likelier than one that stands.
@@ -101,6 +112,8 @@ pub const DOUBTED: f64 = 0.5;
 pub const BEYOND_REFUTATION: f64 = 0.9;
 /// Least confidence of a name that is said, unless an alias is as likely: of 8 below it on the same sets 2 were true.
 pub const LEAST_CONFIDENCE: f64 = 0.45;
+/// As [`LEAST_CONFIDENCE`], of a name and all its aliases together: that one of them is missing is nearly sure.
+pub const LEAST_CONFIDENCE_OF_ALIASES: f64 = 0.7;
 /// Confidence from which a name that says what a channel does is told among the findings of the chain, too: there nothing is
 /// said to be likely. Three runs make nothing as sure.
 pub const TOLD_OF_CHANNEL: f64 = 0.9;
@@ -158,6 +171,9 @@ pub const REAL_MEMORY_PREDICTED: f64 = 0.25;
 pub const REAL_MEMORY_T: f64 = 2.5;
 /// Least memory that is told from a chain without any error of timing, s.
 pub const LEAST_MEMORY_S: f64 = 2.5e-3;
+/// Shortest memory in steps of the recording that is told where no chain shows, nor a channel is out of step: a fifth was true of
+/// those on which that was seen, and below it the steps themselves are what errs.
+pub const STEPS_UNCHAINED: f64 = 0.1;
 /// Damping ratio below which a response rings longer than any filter of a chain: the least damped pole of a fourth-order
 /// Butterworth filter has 0.38.
 pub const RINGING: f64 = 0.12;

@@ -121,6 +121,10 @@ impl Audit {
         Shown {
             of_any: any(|channel| channel != "drag_force_n"),
             of_wheel: any(|channel| channel == "wheel_speed_rad_s"),
+            of_timing: self.findings.iter().any(|found| {
+                let late = found.finding == Word::Late && found.value > 0.0;
+                late || found.finding == Word::Scale
+            }),
         }
     }
 
@@ -139,6 +143,8 @@ pub struct Shown {
     pub of_any: bool,
     /// The wheel speed: slow noise of the vehicle's alone is that sensor's.
     pub of_wheel: bool,
+    /// A channel that is late, against whichever other, or speeds of which one is scaled: no effect makes either.
+    pub of_timing: bool,
 }
 
 /// What the speeds err by, together or the vehicle's alone, and that one's colour.
@@ -285,6 +291,19 @@ mod tests {
         assert!(of_vehicle.of_any && !of_vehicle.of_wheel);
         let of_wheel = of("wheel_speed_rad_s").shown();
         assert!(of_wheel.of_any && of_wheel.of_wheel);
+        let late_by = |value: f64| Audit {
+            findings: vec![Finding::of(
+                "vehicle_speed_m_s",
+                Word::Late,
+                (value, 1e-3),
+                "s",
+            )],
+            ..Audit::default()
+        };
+        let late = late_by(0.03).shown();
+        assert!(late.of_timing && !late.of_any);
+        // A drag that is late makes the others early.
+        assert_eq!(late_by(-0.03).shown(), Shown::default());
     }
 
     /// A coasting vehicle whose slip swings, its speeds read late by so many s.

@@ -37,6 +37,8 @@ pub struct Timing {
     leaves_brake: bool,
     /// How early the wheel speed is left, in s.
     pub(super) wheel_left: f64,
+    /// Whether no chain shows, and no channel was out of step once the drag, brake or wheel speed was left.
+    unchained: bool,
 }
 
 /// Whether a channel is as late as the drag, as far as is known.
@@ -197,7 +199,20 @@ impl Timing {
         if wheel {
             self.leave_wheel();
         }
+        self.unchained = other.map_or_else(
+            || !chain.of_any && !chain.of_timing && self.all_in_step(),
+            |other| other.unchained,
+        );
         (drag, brake)
+    }
+
+    /// Whether a speed is known to be in step with the drag, as it was left, and nothing that is heard is not.
+    fn all_in_step(&self) -> bool {
+        let speeds = [self.wheel, self.vehicle];
+        let mut heard = [self.wheel, self.vehicle, self.brake]
+            .into_iter()
+            .filter(|late| late.std < HEARD_S);
+        speeds.iter().any(|late| late.std < VAGUE_S) && heard.all(in_step)
     }
 
     /// What the timing does not tell of the chain.
@@ -229,7 +244,8 @@ impl Timing {
             channels_s,
             drag_s,
             brake_s,
-            left: self.drag > 0.0 || self.wheel_left > 0.0,
+            left: self.drag > 0.0 || self.wheel_left > 0.0 || self.unchained,
+            unchained: self.unchained,
             by_turn: self.found.wheel_by_turn > SMALL_SHIFT_S,
         }
     }
@@ -342,7 +358,7 @@ mod tests {
         let mut early = timing(-0.004, 0.001, 0.0);
         let of_vehicle = Shown {
             of_any: true,
-            of_wheel: false,
+            ..Shown::default()
         };
         let of_wheel = Shown {
             of_wheel: true,
@@ -430,6 +446,53 @@ mod tests {
         assert!((held.untold().drag_s - 0.0019).abs() < 1e-9);
         // Speeds that are late say nothing of the drag.
         assert!(timing(0.010, 0.030, 0.0).untold().drag_s < 1e-9);
+    }
+
+    #[test]
+    fn nothing_is_left_to_a_chain_that_neither_shows_nor_sets_a_channel_out_of_step() {
+        let untold = |mut timing: Timing, of_any: bool| {
+            let chain = Shown {
+                of_any,
+                ..Shown::default()
+            };
+            timing.leave_to_physics(None, chain);
+            timing.untold()
+        };
+        let in_step = untold(timing(0.0005, -0.001, 0.0), false);
+        assert!(in_step.left && in_step.unchained);
+        let shows = untold(timing(0.0005, -0.001, 0.0), true);
+        assert!(!shows.left && !shows.unchained);
+        // A drag that is late for want of a chain is left in step with the others.
+        assert!(untold(timing(-0.010, -0.010, -0.010), false).unchained);
+        // A late receiver is one, and so is a logger that is behind.
+        assert!(!untold(timing(0.0, 0.030, 0.0), false).unchained);
+        assert!(!untold(timing(0.006, 0.0, 0.0), false).left);
+        // However vaguely it is heard.
+        let with_std = |std: f64| {
+            let mut late = timing(0.0005, 0.030, 0.0);
+            late.vehicle.std = std;
+            late
+        };
+        assert!(!untold(with_std(0.003), false).unchained);
+        // Of a speed that hardly changes nothing is known; of nothing that is known nothing follows.
+        assert!(untold(with_std(0.02), false).unchained);
+        let mut vague = with_std(0.02);
+        vague.wheel.std = 0.003;
+        assert!(!untold(vague, false).unchained);
+        // One that the audit has late against another than the drag.
+        let mut of_another = timing(0.0005, -0.001, 0.0);
+        let of_timing = Shown {
+            of_timing: true,
+            ..Shown::default()
+        };
+        of_another.leave_to_physics(None, of_timing);
+        assert!(!of_another.untold().unchained);
+        // An argument by fewer runs does the same.
+        let mut all = timing(0.0005, -0.001, 0.0);
+        all.leave_to_physics(None, Shown::default());
+        let mut fewer = timing(0.004, -0.001, 0.0);
+        fewer.leave_to_physics(Some(&all), Shown::default());
+        assert!(fewer.untold().unchained);
     }
 
     #[test]

@@ -12,8 +12,11 @@ pub struct Untold {
     pub drag_s: f64,
     /// How early the brake may be read.
     pub brake_s: f64,
-    /// Whether the drag was left late, or the wheel speed early, for want of a chain that would make it so.
+    /// Whether the drag was left late, or the wheel speed early, for want of a chain that would make it so; or nothing shows
+    /// that there is one.
     pub left: bool,
+    /// Whether nothing shows that there is one, nor that a channel is out of step but for what is left.
+    pub unchained: bool,
     /// Whether the wheel speed is late by turn.
     pub by_turn: bool,
 }

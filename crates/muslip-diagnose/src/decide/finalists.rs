@@ -459,13 +459,7 @@ mod tests {
     fn what_is_asked_for_is_tried_whatever_the_screen_has_it_gain() {
         let data = stop(Noise::TYPICAL, 4);
         let base = settled(&data);
-        let untold = Untold {
-            channels_s: 0.0,
-            drag_s: 0.0,
-            brake_s: 0.0,
-            left: false,
-            by_turn: false,
-        };
+        let untold = Untold::default();
         let before = Before::new(&data, &base, untold, 0.0);
         let screen = Screen::new(&data, before, &[], &[]);
         // Nothing is missing, so a lag is not among the best.

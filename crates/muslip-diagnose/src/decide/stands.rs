@@ -1,15 +1,15 @@
 //! Whether a trial stands: whether it is seen, and could be what it claims.
 
-use super::trial::{Claim, Trial};
+use super::trial::{Claim, Trial, worth_of};
 use crate::constants::{
     AGREED_PREDICTED, CLEARLY_PREDICTED, DEPENDENCE_WORTH, FEWEST_RUNS_AGREED, INDIFFERENT_NATS,
-    LARGE_GAIN_AT_SENSORS, LARGE_GAIN_OF_DEPENDENCE_AT_SENSORS, LARGE_GAIN_ON_UNSEEN,
-    LARGE_TO_WORTH, LARGELY_PREDICTED, LEAST_EFFECT, LEAST_GAIN, LEAST_GAIN_AT_SENSORS,
+    LARGE_GAIN_AT_SENSORS, LARGE_GAIN_NOT_FED, LARGE_GAIN_OF_DEPENDENCE_AT_SENSORS,
+    LARGE_GAIN_ON_UNSEEN, LARGE_TO_WORTH, LARGELY_PREDICTED, LEAST_GAIN, LEAST_GAIN_AT_SENSORS,
     LEAST_GAIN_OF_AGREED, LEAST_GAIN_OF_DEPENDENCE_AT_SENSORS, LEAST_PREDICTED,
     LEAST_PREDICTED_BY_DEPENDENCE, LEAST_T, LEAST_T_AT_SENSORS, LEAST_T_AT_SENSORS_NOT_FED,
     LEAST_T_NOT_FED, LEAST_T_OF_AGREED, LEAST_T_OF_DEPENDENCE, LEAST_T_OF_DEPENDENCE_AT_SENSORS,
-    LEAST_T_OF_LARGE, LEAST_T_OF_LIKELIER, LEAST_T_OF_PREDICTED, LINED_UP_PREDICTED,
-    LINED_UP_PREDICTED_BY_DEPENDENCE, PREDICTED_APART,
+    LEAST_T_OF_LARGE, LEAST_T_OF_LIKELIER, LEAST_T_OF_PREDICTED, LEAST_T_OF_SURE,
+    LINED_UP_PREDICTED, LINED_UP_PREDICTED_BY_DEPENDENCE, PREDICTED_APART,
 };
 
 impl Trial {
@@ -47,7 +47,7 @@ impl Trial {
 
 /// Gain of the least effect that is worth a name, nats.
 fn worth(trial: &Trial) -> f64 {
-    0.5 * LEAST_EFFECT * LEAST_EFFECT * trial.readings as f64
+    worth_of(trial.readings)
 }
 
 /// What it is worth in nats that so many runs agree so well, whatever their own noise is: the logarithm of Student's
@@ -73,10 +73,13 @@ fn is_plausible(trial: &Trial) -> bool {
 /// Least logarithm by which a trial has to lower the mean square error of the drag. Of what gains more than any chain leaves a
 /// prediction says little: what a mode makes of the slip's noise spoils that of the true one, too. Where slip sets in, what
 /// sensors and smoothing take off it looks like another curve, a play or a length of the tyre, and predicts little: of 165
-/// development campaigns that lack a thing no true name of the tyre that a chain feeds lowers it by less.
+/// development campaigns that lack a thing no true name of the tyre that a chain feeds lowers it by less. Where several runs
+/// are so alike for what no chain leaves, how little it is beside the noise says nothing against it.
 fn least_predicted(trial: &Trial) -> f64 {
     if gains_beyond_chain(trial) {
         -PREDICTED_APART
+    } else if several_name(trial, LEAST_T_OF_SURE) && trial.first && !trial.remembers {
+        0.0
     } else if trial.fed_by_chain && trial.of_tyre {
         PREDICTED_APART
     } else {
@@ -92,6 +95,14 @@ pub fn gains_beyond_chain(trial: &Trial) -> bool {
     let of_chain = LARGE_GAIN_ON_UNSEEN * trial.share;
     let least = of_chain.max(LARGE_TO_WORTH * worth(trial));
     trial.mechanism().is_some() && trial.predicts.is_finite() && of_runs > least
+}
+
+/// Whether several unseen runs together gain much, and the drag is predicted better.
+fn gains_much(trial: &Trial) -> bool {
+    let of_runs = trial.unseen.0 * trial.runs as f64;
+    let much = of_runs > (LARGE_GAIN_NOT_FED * trial.share).max(LARGE_TO_WORTH * worth(trial));
+    let several = trial.runs >= FEWEST_RUNS_AGREED;
+    much && several && lowers_drag_s_error(trial.predicts, PREDICTED_APART)
 }
 
 /// Gain from which a name that unseen runs bear out is seen, nats.
@@ -217,7 +228,7 @@ fn seen_on_unseen_runs(trial: &Trial) -> bool {
         Claim::Mechanism(..) => {
             let clearly = lowers_drag_s_error(trial.predicts, CLEARLY_PREDICTED);
             let large = gains_beyond_chain(trial);
-            let least = if large || clearly && !trial.fed_by_chain {
+            let least = if large || (clearly || gains_much(trial)) && !trial.fed_by_chain {
                 LEAST_T_NOT_FED
             } else {
                 LEAST_T
@@ -355,6 +366,52 @@ mod tests {
     }
 
     #[test]
+    fn several_runs_that_are_very_alike_need_not_predict_much_better() {
+        let data = stop(Noise::TYPICAL, 4);
+        let base = toy::settled(&data);
+        let trial = |t: f64, predicts: f64| Trial {
+            predicts,
+            first: true,
+            at_sensors: (2.0, 1.0),
+            ..of_name(&data, &base, Id::LoadCrosstalk, 20.0, t)
+        };
+        assert!(stands(&trial(5.1, 0.02)) && !stands(&trial(4.9, 0.02)));
+        assert!(!stands(&trial(9.0, -0.01)), "but no worse");
+        let fed = Trial {
+            fed_by_chain: true,
+            ..trial(9.0, 0.02)
+        };
+        let on_three = Trial {
+            runs: 3,
+            ..trial(9.0, 0.02)
+        };
+        // What a name's form leaves is the same in all runs, too.
+        let beside_another = Trial {
+            first: false,
+            ..trial(9.0, 0.02)
+        };
+        assert!(!stands(&fed) && !stands(&on_three) && !stands(&beside_another));
+    }
+
+    #[test]
+    fn a_large_gain_that_no_chain_leaves_needs_less_even_runs_where_it_predicts_better() {
+        let data = stop(Noise::TYPICAL, 4);
+        let base = toy::settled(&data);
+        // So many nats on each of six unseen runs.
+        let trial = |nats: f64, predicts: f64| Trial {
+            predicts,
+            ..of_name(&data, &base, Id::ForceSaturation, nats, 1.6)
+        };
+        assert!(stands(&trial(11.0, 0.11)));
+        assert!(!stands(&trial(9.0, 0.11)) && !stands(&trial(11.0, 0.09)));
+        let fed = Trial {
+            fed_by_chain: true,
+            ..trial(11.0, 0.11)
+        };
+        assert!(!stands(&fed));
+    }
+
+    #[test]
     fn runs_that_line_up_make_a_name_stand_whose_gains_are_uneven() {
         let data = stop(Noise::TYPICAL, 4);
         let base = toy::settled(&data);
@@ -408,7 +465,7 @@ mod tests {
         assert!(stands(&wear(3.6, 0.32)) && needed(&wear(3.6, 0.32)));
         let refused = [
             wear(2.9, 0.32),
-            wear(3.6, 0.14),
+            wear(3.6, 0.09),
             // An inertia predicts no drag.
             wear(3.6, f64::INFINITY),
             Trial {

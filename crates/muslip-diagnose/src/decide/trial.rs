@@ -2,8 +2,9 @@
 
 use crate::chain::untold::Untold;
 use crate::constants::{
-    LEAST_MEMORY_S, LEAST_T, MOST_AGAINST, PRICE_OF_NAME, PRICE_OF_PARAMETER,
-    REAL_MEMORY_PREDICTED, REAL_MEMORY_T,
+    FEWEST_RUNS_AGREED, LARGE_GAIN_OF_BRAKE, LEAST_EFFECT, LEAST_MEMORY_S, LEAST_STD_S, LEAST_T,
+    MOST_AGAINST, PRICE_OF_NAME, PRICE_OF_PARAMETER, REAL_MEMORY_PREDICTED, REAL_MEMORY_T,
+    STEPS_UNCHAINED, WORTHS_OF_BRAKE,
 };
 use crate::data::Data;
 use crate::innovations::dependence::Dependence;
@@ -156,6 +157,18 @@ fn sum_and_t(gains: &[f64]) -> (f64, f64) {
     (gains.iter().sum(), mean_and_t(&roots).1)
 }
 
+/// Whether unseen runs together, these gains at the fitted noise and that at the sensors', gain more by a lag of the brake than
+/// any reading of a brake through a chain does, of so many readings and this share of the runs: more readings as much more.
+fn gains_beyond_reading(gains: &[f64], at_sensors: f64, readings: usize, share: f64) -> bool {
+    let least = (LARGE_GAIN_OF_BRAKE * share).max(WORTHS_OF_BRAKE * worth_of(readings));
+    gains.len() >= FEWEST_RUNS_AGREED && gains.iter().sum::<f64>().min(at_sensors) > least
+}
+
+/// Gain of the least effect that is worth a name, of so many readings, nats.
+pub fn worth_of(readings: usize) -> f64 {
+    0.5 * LEAST_EFFECT * LEAST_EFFECT * readings as f64
+}
+
 /// Whether a claim may be what a name leaves, by whether that is a memory of the force and whether a chain feeds the
 /// claim, where it is a mechanism: what such a memory leaves looks like what a chain leaves, or like a dependence on a
 /// rate, but like no other mechanism.
@@ -245,13 +258,15 @@ impl<'a> Before<'a> {
                 && mechanism.is_plausible(&term.parameters, &data.context)
                 && !mechanism.facts().counter_form
         });
-        let remembered = term.and_then(|term| self.remembered(term, predicts, at_sensors.1));
+        let unseen = mean_and_t(&own_gains);
+        let much = gains_beyond_reading(&own_gains, at_sensors.0, readings, data.share);
+        let remembered = term.and_then(|term| self.remembered(term, predicts, at_sensors.1, much));
         let of_left = remembered.as_ref().is_some_and(|memory| memory.of_left);
         let price = PRICE_OF_PARAMETER * free + PRICE_OF_NAME;
         Trial {
             gain: base.loss - judged.loss - price,
             price,
-            unseen: mean_and_t(&own_gains),
+            unseen,
             runs: own_gains.len(),
             share: data.share,
             first: !self.is_named_before(&claim, fed_by_chain) || at_sensors.0 > self.taken_up,
@@ -293,8 +308,15 @@ impl<'a> Before<'a> {
     }
 
     /// What a term remembers beside the chain, where it is a memory; by how much better it predicts the drag, and the t of
-    /// the gains' roots at the sensors' noise.
-    fn remembered(&self, term: &Term, predicts: f64, t_at_sensors: f64) -> Option<Remembered> {
+    /// the gains' roots at the sensors' noise; whether unseen runs gain so `much` at both levels that no reading of a brake
+    /// through a chain does.
+    fn remembered(
+        &self,
+        term: &Term,
+        predicts: f64,
+        t_at_sensors: f64,
+        much: bool,
+    ) -> Option<Remembered> {
         let data = self.data;
         let mechanism = data.catalogue.get(term.entry);
         let memory_s = mechanism.memory_s(&term.parameters, &data.context)?;
@@ -302,13 +324,18 @@ impl<'a> Before<'a> {
         let of_left = in_force && self.untold.left;
         let alike = t_at_sensors > REAL_MEMORY_T || of_left;
         let real = in_force && predicts > REAL_MEMORY_PREDICTED && alike;
-        let shown_s = shortest_shown_s(data, term.entry, real);
+        let unchained = in_force && self.untold.unchained;
+        let shown_s = if unchained {
+            LEAST_STD_S.max(STEPS_UNCHAINED * data.context.dt / data.averaged as f64)
+        } else {
+            shortest_shown_s(data, term.entry, real)
+        };
         let least_s = shown_s.max(least_memory_s(data, term.entry, of_left));
         // That a memory is real does not say whose it is: one of the tyre must outlast what it leaves to the chain.
         let guide = mechanism.guide();
         let shortest_s = [
-            (!real).then_some(self.untold.channels_s),
-            (guide.kind == Kind::Tyre).then(|| self.untold.shortest_of_tyre_s()),
+            (!real && !unchained).then_some(self.untold.channels_s),
+            (guide.kind == Kind::Tyre && !unchained).then(|| self.untold.shortest_of_tyre_s()),
         ];
         let chain_s = shortest_s.into_iter().flatten().fold(0.0, f64::max);
         let of_brake = guide.kind == Kind::Wheel && guide.memory == Memory::Kernel;
@@ -319,7 +346,8 @@ impl<'a> Before<'a> {
         };
         Some(Remembered {
             lasts: memory_s > shown_s,
-            outlasts_chain: memory_s > least_s.max(chain_s) && memory_s < longest_s,
+            outlasts_chain: memory_s > least_s.max(chain_s) && memory_s < longest_s
+                || of_brake && much && memory_s > shown_s,
             of_left,
         })
     }
@@ -398,6 +426,19 @@ mod tests {
         assert_eq!(gains(&before, &with, false), [3.0, -1.0]);
         // Halves that the claim says nothing of are no evidence either way.
         assert_eq!(gains(&before, &with, true), [1.0, -0.5]);
+    }
+
+    #[test]
+    fn a_lag_of_the_brake_is_one_where_several_runs_gain_more_than_any_reading_of_it() {
+        let gains = |nats: f64, runs: usize| vec![nats; runs];
+        let beyond = |gains: &[f64]| gains_beyond_reading(gains, 90.0, 3_000, 1.0);
+        assert!(beyond(&gains(11.0, 4)) && !beyond(&gains(9.0, 4)) && !beyond(&gains(60.0, 1)));
+        let at_sensors = |nats: f64| gains_beyond_reading(&gains(11.0, 4), nats, 3_000, 1.0);
+        assert!(at_sensors(41.0) && !at_sensors(39.0));
+        // Twenty thousand readings gain 49 nats by what is worth a name at all.
+        assert!(!gains_beyond_reading(&gains(30.0, 4), 120.0, 20_000, 1.0));
+        // Without what is kept for the proof there is less to gain.
+        assert!(gains_beyond_reading(&gains(9.0, 4), 90.0, 3_000, 0.8));
     }
 
     #[test]

@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use super::answer::Answer;
 use crate::chain::correct::Lateness;
 use crate::constants::{
-    LEAST_GAIN_OF_PREDICTION, LEAST_STDS_EXPORTED, LEAST_STDS_GAINED, MOST_WORSE,
+    LEAST_GAIN_OF_PREDICTION, LEAST_STDS_EXPORTED, LEAST_STDS_GAINED, MOST_WORSE, PREDICTED_APART,
 };
 use crate::data::{Catalogue, Data};
 use crate::law::closest;
@@ -193,6 +193,7 @@ impl Answer<'_> {
         Predicts {
             known: gained || surely_gained(&known),
             unseen: gained
+                && each_clearly_gains(&unseen)
                 && next_gains(&shares, LEAST_STDS_EXPORTED)
                 && self
                     .decision
@@ -221,7 +222,7 @@ fn is_dynamic(catalogue: &Catalogue, term: &Term) -> bool {
 pub(super) struct Predicts {
     /// Those that it was made from.
     pub known: bool,
-    /// The same, as if they had never been seen.
+    /// The same, as if they had never been seen, and each of them clearly.
     pub unseen: bool,
 }
 
@@ -231,6 +232,11 @@ fn surely_gained(gains: &[f64]) -> bool {
     let mean = mean_and_std(gains).0;
     let sure = mean > LEAST_GAIN_OF_PREDICTION && next_gains(gains, LEAST_STDS_GAINED);
     sure && gains.iter().all(|g| *g > -MOST_WORSE.ln())
+}
+
+/// Whether each recording is predicted clearly better.
+fn each_clearly_gains(gains: &[f64]) -> bool {
+    gains.iter().all(|gain| *gain > PREDICTED_APART)
 }
 
 /// Whether the next recording gains unless it lies further off the mean than so many standard deviations.
@@ -268,5 +274,11 @@ mod tests {
             "one lost a percent"
         );
         assert!(!surely_gained(&[]) && !surely_gained(&[f64::NAN, 0.5]));
+    }
+
+    #[test]
+    fn a_model_is_exported_where_no_recording_is_predicted_as_well_without_it() {
+        assert!(each_clearly_gains(&[0.11, 0.5, 0.3]));
+        assert!(!each_clearly_gains(&[0.09, 0.5, 0.3]) && !each_clearly_gains(&[f64::NAN]));
     }
 }

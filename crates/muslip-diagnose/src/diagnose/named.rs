@@ -6,8 +6,9 @@ use super::answer::{Answer, Unsaid, Why};
 use crate::audit::{Ring, Timing};
 use crate::constants::{
     AUDITED, DOUBTED, FEW_RUNS_SURE, FORM_OF_DELAY_S, HARDLY_LESS, LEAST_BRAKE_EARLY_IN_STEP_S,
-    LEAST_CONFIDENCE, LEAST_DELAY_S, LEAST_PREDICTED, LEAST_STDS_OF_FIGURE, LEAST_T_NOT_FED,
-    PREDICTED_APART, RARE_SHARE, SURE_DELAY, TIED, UNKNOWN_STDS, VAGUE_DELAY_S,
+    LEAST_CONFIDENCE, LEAST_CONFIDENCE_OF_ALIASES, LEAST_DELAY_S, LEAST_PREDICTED,
+    LEAST_STDS_OF_FIGURE, LEAST_T_NOT_FED, PREDICTED_APART, RARE_SHARE, SURE_DELAY, TIED,
+    UNKNOWN_STDS, VAGUE_DELAY_S,
 };
 use crate::decide::{Claim, Trial, few_reach, rivals, softness};
 use crate::figures::{figures, stds_from_none, with_form};
@@ -124,10 +125,10 @@ impl Answer<'_> {
             let of_alias =
                 |other: &&Alternative| aliases.iter().any(|a| a.with.as_str() == other.id);
             let aliases = sure.others.iter().filter(of_alias).map(|o| o.confidence);
-            let tied = tied(sure.share, aliases) / sure.share.max(1e-9);
+            let aliases: Vec<f64> = aliases.collect();
             let why = if !self.has_a_figure(term.entry, &taken_up.judged) {
                 Why::NoFigure
-            } else if few || likely(sure.confidence, tied) {
+            } else if few || likely(sure.confidence, sure.share, &aliases) {
                 return None;
             } else {
                 Why::Unlikely(sure.confidence)
@@ -416,14 +417,14 @@ fn confidence(share: f64, steadiness: f64, runs: usize) -> f64 {
     (share * surest(runs) * steady).clamp(0.01, 0.99)
 }
 
-/// Shares of the aliases that nothing in the recordings tells from a name with this one.
-fn tied(share: f64, aliases: impl Iterator<Item = f64>) -> f64 {
-    aliases.filter(|alias| *alias > TIED * share).sum()
-}
-
-/// Whether a name is likely enough to be said together with its aliases, whose shares are so many times its own.
-fn likely(confidence: f64, tied: f64) -> bool {
-    confidence * (1.0 + tied) > LEAST_CONFIDENCE
+/// Whether a name with this share is likely enough to be said: by itself, with aliases that nothing in the recordings tells
+/// from it, or because it is nearly sure that it is missing or one of its aliases.
+fn likely(confidence: f64, share: f64, aliases: &[f64]) -> bool {
+    let with = |least: f64| {
+        let as_likely = aliases.iter().filter(|alias| **alias > least * share);
+        confidence * (1.0 + as_likely.sum::<f64>() / share.max(1e-9))
+    };
+    with(TIED) > LEAST_CONFIDENCE || with(0.0) > LEAST_CONFIDENCE_OF_ALIASES
 }
 
 #[cfg(test)]
@@ -458,13 +459,14 @@ mod tests {
 
     #[test]
     fn a_name_is_said_alone_or_with_an_alias_that_nothing_tells_from_it() {
-        assert!(likely(0.46, 0.0) && !likely(0.44, 0.0));
-        let share = 0.4;
-        let with = |alias: f64| likely(0.3, tied(share, [alias].into_iter()) / share);
+        assert!(likely(0.46, 0.6, &[]) && !likely(0.44, 0.6, &[0.1]));
+        let with = |alias: f64| likely(0.3, 0.4, &[alias]);
         assert!(with(0.4) && !with(0.39));
         assert!(
-            !likely(0.05, 1.0),
+            !likely(0.05, 0.4, &[0.4]),
             "two unlikely ones are unlikely together"
         );
+        // Three of which each may be it: 0.31 of 0.35.
+        assert!(likely(0.31, 0.35, &[0.3, 0.25]) && !likely(0.31, 0.35, &[0.3, 0.1]));
     }
 }
