@@ -4,6 +4,7 @@ use core::ops::Range;
 
 use crate::audit::hold::hold;
 use crate::campaign::Run;
+use crate::cleaning::stretches;
 use crate::constants::LEAST_REPEATED;
 use crate::series::GAP_STEPS;
 use crate::smooth::median_in_place;
@@ -17,51 +18,31 @@ const LEAST_STANDS: usize = 20;
 /// to the ends: as late on average as the staircase, without its steps. Any other channel as it is.
 fn unheld(time: &[f64], x: &[f64]) -> Vec<f64> {
     let mut out = x.to_vec();
-    if !is_held(&stands(x, 0..x.len())) {
+    let after = |begins: &dyn Fn(usize) -> bool| -> Vec<bool> {
+        (0..x.len()).map(|k| k > 0 && begins(k)).collect()
+    };
+    let changes = after(&|k| x[k] != x[k - 1]);
+    if !is_held(&between(&changes)) {
         return out;
     }
     let period = hold(time, x).map(|hold| hold.period_s);
     let mut steps: Vec<f64> = time.windows(2).map(|w| w[1] - w[0]).collect();
     let step = median_in_place(&mut steps);
-    for part in parts(time, GAP_STEPS * step) {
-        let stands = stands(x, part.clone());
+    let gaps = after(&|k| time[k] - time[k - 1] > GAP_STEPS * step);
+    for part in between(&gaps) {
+        let stands = between(&changes[part.clone()]);
         if stands.len() > 1 {
-            draw(
-                time,
-                x,
-                part,
-                &readings(time, step, &stands, period),
-                &mut out,
-            );
+            let time = &time[part.clone()];
+            let readings = readings(time, step, &stands, period);
+            draw(time, &x[part.clone()], &readings, &mut out[part]);
         }
     }
     out
 }
 
-/// Stretches of a recording without a step longer than this.
-fn parts(time: &[f64], longest: f64) -> Vec<Range<usize>> {
-    let ends = (1..time.len()).filter(|k| time[*k] - time[*k - 1] > longest);
-    let mut parts = Vec::new();
-    let mut from = 0;
-    for end in ends.chain([time.len()]) {
-        parts.push(from..end);
-        from = end;
-    }
-    parts
-}
-
-/// Stretches of samples that repeat the one before.
-fn stands(x: &[f64], part: Range<usize>) -> Vec<Range<usize>> {
-    let mut stands = Vec::new();
-    let mut from = part.start;
-    for k in part.start + 1..part.end {
-        if x[k] != x[k - 1] {
-            stands.push(from..k);
-            from = k;
-        }
-    }
-    stands.push(from..part.end);
-    stands
+/// Stretches of samples from one of these breaks to the next.
+fn between(breaks: &[bool]) -> Vec<Range<usize>> {
+    stretches(|_| true, breaks, 1)
 }
 
 /// Whether a channel repeats its readings where it moves at all: a standstill repeats without being held.
@@ -77,7 +58,7 @@ fn is_held(stands: &[Range<usize>]) -> bool {
     repeated > LEAST_REPEATED * moving && stands.len() >= LEAST_STANDS
 }
 
-/// Readings of a held channel: the middle of the time for which each stands, and a sample that has it. Where the `period` is
+/// Readings of a held channel of two stands or more: the middle of the time for which each stands, and a sample that has it. Where the `period` is
 /// known, a stand of several of them is as many readings that happen to be equal: as one, at the middle of all of them, an
 /// equal reading more or less would move the mean. Where it is not, a stand that is much longer than others is. The recording
 /// cuts the first and the last stand short: they are taken to be as long as the others, for a line to the middle of what is
@@ -89,7 +70,7 @@ fn readings(
     period: Option<f64>,
 ) -> Vec<(f64, usize)> {
     let stood = |stand: &Range<usize>| time[stand.end - 1] - time[stand.start] + step;
-    let inner = stands.get(1..stands.len().max(2) - 1).unwrap_or_default();
+    let inner = &stands[1..stands.len() - 1];
     let mut lengths: Vec<f64> = inner.iter().map(stood).collect();
     let one = period.unwrap_or_else(|| median_in_place(&mut lengths));
     let mut readings = Vec::new();
@@ -123,10 +104,10 @@ fn readings(
     readings
 }
 
-/// Draws a part of a channel as straight lines between its readings, and along the first and the last of them on to its ends.
-fn draw(time: &[f64], x: &[f64], part: Range<usize>, readings: &[(f64, usize)], out: &mut [f64]) {
+/// Draws a channel without a gap as straight lines between its readings, and along the first and the last of them on to its ends.
+fn draw(time: &[f64], x: &[f64], readings: &[(f64, usize)], out: &mut [f64]) {
     let mut at = 0;
-    for k in part {
+    for k in 0..time.len() {
         while at + 2 < readings.len() && readings[at + 1].0 <= time[k] {
             at += 1;
         }

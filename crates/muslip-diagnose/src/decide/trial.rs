@@ -325,11 +325,7 @@ impl<'a> Before<'a> {
         let alike = t_at_sensors > REAL_MEMORY_T || of_left;
         let real = in_force && predicts > REAL_MEMORY_PREDICTED && alike;
         let unchained = in_force && self.untold.unchained;
-        let shown_s = if unchained {
-            LEAST_STD_S.max(STEPS_UNCHAINED * data.context.dt / data.averaged as f64)
-        } else {
-            shortest_shown_s(data, term.entry, real)
-        };
+        let shown_s = shortest_shown_s(data, term.entry, real, unchained);
         let least_s = shown_s.max(least_memory_s(data, term.entry, of_left));
         // That a memory is real does not say whose it is: one of the tyre must outlast what it leaves to the chain.
         let guide = mechanism.guide();
@@ -384,14 +380,16 @@ fn squares_by_best_law(data: &Data, judged: &Judged) -> Vec<f64> {
 
 /// Shortest memory in s that a recording shows. None is shorter than its step, or half of it where it is real: how a reading
 /// changes between two samples is not known, but what it changes by from one to the next is. An acceleration takes two steps
-/// to be seen, with the torque that enters at both.
-fn shortest_shown_s(data: &Data, entry: usize, real: bool) -> f64 {
-    let steps = match data.catalogue.get(entry).id().balance() {
-        Balance::Wheel => 2.0,
-        _ if real => 0.5,
-        _ => 1.0,
+/// to be seen, with the torque that enters at both. Where it is `unchained` the drag's lateness shows it, however a reading
+/// changes in between.
+fn shortest_shown_s(data: &Data, entry: usize, real: bool, unchained: bool) -> f64 {
+    let (steps, least_s) = match data.catalogue.get(entry).id().balance() {
+        _ if unchained => (STEPS_UNCHAINED, LEAST_STD_S),
+        Balance::Wheel => (2.0, 0.0),
+        _ if real => (0.5, 0.0),
+        _ => (1.0, 0.0),
     };
-    steps * data.context.dt / data.averaged as f64
+    least_s.max(steps * data.context.dt / data.averaged as f64)
 }
 
 /// Shortest memory in s that is told from the chain's by its length: a filtered reading of the brake holds less noise than the
