@@ -5,11 +5,12 @@ use std::collections::BTreeMap;
 use serde::{Deserialize, Serialize};
 
 use crate::campaign::{Rig, Run};
+use crate::chain::coast::Coasting;
 use crate::chain::correct::Lateness;
 use crate::correction::{Action, Levers, hat};
 use crate::data::{Catalogue, Data};
-use crate::mechanism::{Context, Parameter};
-use crate::model::{Model, Term, tyre};
+use crate::mechanism::{Context, Law, Parameter};
+use crate::model::{Model, TYRE_BASE, Term, tyre};
 pub use crate::noise::Likelihood;
 use crate::number::finite_or_zero;
 use crate::prepare::prepare;
@@ -420,11 +421,28 @@ impl Repaired {
         self.data_of(series, extra_names)
     }
 
+    /// A run with every channel at the drag's time.
+    fn in_time(&self, run: &Run) -> Run {
+        let mut corrected = self.late.corrected(run);
+        // Beside mechanisms the law may be any, which they make up for.
+        let alone = self.tyre.is_empty() && self.corrections.is_empty();
+        let law = if alone { &self.base } else { &self.base_alone };
+        if self.rig.coasting && law.len() == TYRE_BASE {
+            let coasting = Coasting {
+                mass_kg: self.rig.mass_kg,
+                radius_m: self.rig.radius_m,
+                law: Law::rudd(law[0].exp(), law[1].exp()),
+            };
+            coasting.draw_on(run, &self.late, &mut corrected);
+        }
+        corrected
+    }
+
     /// What a prediction of a recording is made from: its other columns, by the repaired model at the drag's time.
     pub(crate) fn inputs(&self, run: &Run, which: Which) -> Data {
         let mut blind = match which {
             Which::Base => run.clone(),
-            Which::Repaired => self.late.corrected(run),
+            Which::Repaired => self.in_time(run),
         };
         blind.drag_force_n = Vec::new();
         self.prepared(&blind)

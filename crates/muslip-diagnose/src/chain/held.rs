@@ -14,30 +14,54 @@ const LONG_STAND: f64 = 3.0;
 /// Fewest stands of a channel that is held.
 const LEAST_STANDS: usize = 20;
 
+/// A reading: the middle in s of the time for which it stands, and a sample that has it.
+type Reading = (f64, usize);
+
 /// A held channel with every reading at the middle of the time for which it stands, and straight lines in between, and on
 /// to the ends: as late on average as the staircase, without its steps. Any other channel as it is.
 fn unheld(time: &[f64], x: &[f64]) -> Vec<f64> {
     let mut out = x.to_vec();
+    for (part, readings) in parts(time, x) {
+        draw(
+            &time[part.clone()],
+            &x[part.clone()],
+            &readings,
+            &mut out[part],
+        );
+    }
+    out
+}
+
+/// Time in s at which a channel was last read: its last sample, or the middle of the time for which its last reading stands, where
+/// it is held.
+pub fn last_reading(time: &[f64], x: &[f64]) -> Option<f64> {
+    let end = *time.last()?;
+    let last = parts(time, x).pop();
+    let last = last.filter(|(part, _)| part.end == time.len());
+    let read = last.and_then(|(_, readings)| Some(readings.last()?.0));
+    Some(read.map_or(end, |read| read.min(end)))
+}
+
+/// Readings of a held channel, see [`readings`], by the parts between its gaps that have two or more; none of any other channel.
+fn parts(time: &[f64], x: &[f64]) -> Vec<(Range<usize>, Vec<Reading>)> {
     let after = |begins: &dyn Fn(usize) -> bool| -> Vec<bool> {
         (0..x.len()).map(|k| k > 0 && begins(k)).collect()
     };
     let changes = after(&|k| x[k] != x[k - 1]);
     if !is_held(&between(&changes)) {
-        return out;
+        return Vec::new();
     }
     let period = hold(time, x).map(|hold| hold.period_s);
     let mut steps: Vec<f64> = time.windows(2).map(|w| w[1] - w[0]).collect();
     let step = median_in_place(&mut steps);
     let gaps = after(&|k| time[k] - time[k - 1] > GAP_STEPS * step);
-    for part in between(&gaps) {
+    let with_readings = between(&gaps).into_iter().filter_map(|part| {
         let stands = between(&changes[part.clone()]);
-        if stands.len() > 1 {
-            let time = &time[part.clone()];
-            let readings = readings(time, step, &stands, period);
-            draw(time, &x[part.clone()], &readings, &mut out[part]);
-        }
-    }
-    out
+        let readings =
+            (stands.len() > 1).then(|| readings(&time[part.clone()], step, &stands, period));
+        Some((part, readings?))
+    });
+    with_readings.collect()
 }
 
 /// Stretches of samples from one of these breaks to the next.
@@ -63,12 +87,7 @@ fn is_held(stands: &[Range<usize>]) -> bool {
 /// equal reading more or less would move the mean. Where it is not, a stand that is much longer than others is. The recording
 /// cuts the first and the last stand short: they are taken to be as long as the others, for a line to the middle of what is
 /// left would be up to twice too steep.
-fn readings(
-    time: &[f64],
-    step: f64,
-    stands: &[Range<usize>],
-    period: Option<f64>,
-) -> Vec<(f64, usize)> {
+fn readings(time: &[f64], step: f64, stands: &[Range<usize>], period: Option<f64>) -> Vec<Reading> {
     let stood = |stand: &Range<usize>| time[stand.end - 1] - time[stand.start] + step;
     let inner = &stands[1..stands.len() - 1];
     let mut lengths: Vec<f64> = inner.iter().map(stood).collect();
@@ -105,7 +124,7 @@ fn readings(
 }
 
 /// Draws a channel without a gap as straight lines between its readings, and along the first and the last of them on to its ends.
-fn draw(time: &[f64], x: &[f64], readings: &[(f64, usize)], out: &mut [f64]) {
+fn draw(time: &[f64], x: &[f64], readings: &[Reading], out: &mut [f64]) {
     let mut at = 0;
     for k in 0..time.len() {
         while at + 2 < readings.len() && readings[at + 1].0 <= time[k] {
@@ -153,6 +172,17 @@ mod tests {
             assert!((line[k] - (20.0 - 3.0 * (time[k] - 0.008))).abs() < 1e-9);
         }
         assert_eq!(unheld(&time, &line)[10..290], line[10..290]);
+    }
+
+    #[test]
+    fn a_channel_was_last_read_in_the_middle_of_its_last_stand() {
+        let time: Vec<f64> = (0..300).map(|k| 0.004 * f64::from(k)).collect();
+        let held: Vec<f64> = (0..300).map(|k| f64::from(5 * (k / 5))).collect();
+        // Five samples from the last but five on.
+        let last = last_reading(&time, &held).unwrap();
+        assert!((last - (time[295] + 0.008)).abs() < 1e-9, "{last}");
+        assert_eq!(last_reading(&time, &time), Some(time[299]));
+        assert_eq!(last_reading(&[], &[]), None);
     }
 
     #[test]

@@ -13,6 +13,7 @@ use crate::law::{closest, squares};
 use crate::mechanism::{Balance, Id, Kind, Memory};
 use crate::model::Term;
 use crate::number::mean_and_std;
+use crate::variable::Variable;
 
 /// What a trial adds to a model.
 #[derive(Clone)]
@@ -242,7 +243,12 @@ impl<'a> Before<'a> {
         let counts = judged.grams.iter().flatten().map(|g| g.count);
         let readings = counts.sum::<usize>() / judged.parts.len().max(1);
         let mechanism = claim.mechanism();
-        let fed_by_chain = mechanism.map(|(_, entry)| data.catalogue.get(entry).fed_by_chain());
+        let term = term_of(&claim, &judged);
+        let fed_by_chain = mechanism.map(|(_, entry)| {
+            let own = data.catalogue.get(entry);
+            own.fed_by_chain()
+                || term.is_some_and(|term| own.begins_with_recordings(&term.parameters))
+        });
         let predicts = if claim.works_through_force(data) {
             self.predicted_better(&judged)
         } else {
@@ -251,12 +257,13 @@ impl<'a> Before<'a> {
         let own_gains = gains(&base.unseen, &judged.unseen, per_run);
         let gains_at_sensors = self.gains_at_sensors(&judged, per_run);
         let at_sensors = sum_and_t(&gains_at_sensors);
-        let term = term_of(&claim, &judged);
         let own = term.is_none_or(|term| {
             let mechanism = data.catalogue.get(term.entry);
+            let facts = mechanism.facts();
             mechanism.owns(&term.parameters, &data.context)
                 && mechanism.is_plausible(&term.parameters, &data.context)
-                && !mechanism.facts().counter_form
+                && !facts.counter_form
+                && !(facts.another_curve && self.has_a_curve_beside())
         });
         let unseen = mean_and_t(&own_gains);
         let much = gains_beyond_reading(&own_gains, at_sensors.0, readings, data.share);
@@ -291,6 +298,12 @@ impl<'a> Before<'a> {
             judged: judged.without_columns(),
             claim,
         }
+    }
+
+    /// Whether friction depends freely on the slip beside the law.
+    fn has_a_curve_beside(&self) -> bool {
+        let mut beside = self.judged.extra.iter();
+        beside.any(|own| own.balance == Balance::Tyre && own.variable == Variable::Slip)
     }
 
     /// Whether something of a claim's balance is named already that may have left what the claim is of.
@@ -407,6 +420,7 @@ fn least_memory_s(data: &Data, entry: usize, left: bool) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::innovations::{dependence, toy};
 
     fn unseen(runs: &[f64], halves: &[f64]) -> Unseen {
         Unseen {
@@ -424,6 +438,34 @@ mod tests {
         assert_eq!(gains(&before, &with, false), [3.0, -1.0]);
         // Halves that the claim says nothing of are no evidence either way.
         assert_eq!(gains(&before, &with, true), [1.0, -0.5]);
+    }
+
+    #[test]
+    fn another_curve_beside_a_free_dependence_along_the_slip_is_not_asked_for() {
+        let data = toy::stop(toy::Noise::TYPICAL, 4);
+        let base = toy::settled(&data);
+        let along = |variable: &Variable| {
+            let mut all = dependence::all(&data).into_iter();
+            all.find(|own| own.balance == Balance::Tyre && own.variable == *variable)
+                .unwrap()
+        };
+        let owns = |id: Id, variable: &Variable| {
+            let mut so_far = base.clone();
+            so_far.extra = vec![along(variable)];
+            let claim = Claim::Mechanism(id, toy::entry_of(&data, id));
+            let mut with = so_far.clone();
+            let entry = toy::entry_of(&data, id);
+            let count = data.catalogue.get(entry).parameters(&data.context).len();
+            with.model.terms.push(Term {
+                entry,
+                parameters: vec![0.1; count],
+            });
+            let before = Before::new(&data, &so_far, Untold::default(), 0.0);
+            before.tried(claim, with, f64::INFINITY).own
+        };
+        assert!(!owns(Id::CurveShape, &Variable::Slip));
+        assert!(owns(Id::CurveShape, &Variable::Time));
+        assert!(owns(Id::LoadSensitivity, &Variable::Slip));
     }
 
     #[test]

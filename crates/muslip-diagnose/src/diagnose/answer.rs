@@ -6,6 +6,7 @@ use crate::audit::Audit;
 use crate::campaign::{Rig, Run};
 use crate::chain::recorded::Recorded;
 use crate::chain::timing::Timing;
+use crate::constants::WEAK_NATS;
 use crate::data::Data;
 use crate::decide::{Asked, Decision, Trial, could_stand, decide, gains_beyond_chain};
 use crate::innovations::hypothesis::{Judged, whole_over_slow};
@@ -33,6 +34,8 @@ pub(super) struct NameOfForce {
     pub(super) remembers: bool,
     /// Whether it gains more than a measuring chain leaves.
     pub(super) beyond_chain: bool,
+    /// Whether so little speaks for it that the errors of a chain may have chosen it.
+    pub(super) weak: bool,
     /// Its confidence.
     pub(super) confidence: f64,
     /// What its round holds for hardly less likely.
@@ -146,6 +149,7 @@ impl<'a> Answer<'a> {
     /// Its names that work through the force.
     pub(super) fn names_of_force(&self) -> Vec<NameOfForce> {
         let catalogue = &self.data.catalogue;
+        let chained = !self.timing.untold().unchained;
         let terms = self.decision.chosen.model.terms.iter();
         terms
             .map(|term| (term, catalogue.get(term.entry)))
@@ -155,6 +159,7 @@ impl<'a> Answer<'a> {
                 NameOfForce {
                     id: mechanism.id(),
                     remembers: self.remembers_force(term),
+                    weak: chained && taken_up.is_none_or(|own| own.weight() < WEAK_NATS),
                     beyond_chain: taken_up.is_some_and(gains_beyond_chain),
                     confidence: sure.as_ref().map_or(0.0, |own| own.confidence),
                     rivals: sure.map_or(Vec::new(), |own| own.rivals()),

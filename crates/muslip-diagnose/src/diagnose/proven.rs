@@ -218,8 +218,8 @@ fn with_named(audit: &Audit, named: &[NamedMechanism], catalogue: &Catalogue) ->
 /// Names that the same argument without what is kept speaks against: a memory where it knows of none at all, or names one
 /// with which it predicts what is kept worse than without, for the chain's own kernels do much of what a memory does, but where
 /// it gains more than a chain leaves; any other
-/// where it does not come to that, nor to what is hardly likelier than that, but to another in its place that is no memory. What all
-/// recordings together make sure is not refuted by fewer.
+/// where it does not come to that, nor to what is hardly likelier than that, but to another in its place that is no memory, or
+/// where little speaks for it. What all recordings together make sure is not refuted by fewer.
 fn refuted(named: &[NameOfForce], again: &Again) -> Vec<Id> {
     let has = |names: &[NameOfForce], id: Id| names.iter().any(|name| name.id == id);
     let other = |name: &NameOfForce| !name.remembers && !has(named, name.id);
@@ -229,7 +229,8 @@ fn refuted(named: &[NameOfForce], again: &Again) -> Vec<Id> {
         let contradicted = if name.remembers {
             again.remembers_worse && !name.beyond_chain || !again.remembers
         } else {
-            another && !has(&again.names, name.id) && !rivals(name.id)
+            let instead = another || name.weak;
+            instead && !has(&again.names, name.id) && !rivals(name.id)
         };
         contradicted && name.confidence < BEYOND_REFUTATION
     };
@@ -248,6 +249,7 @@ mod tests {
             id,
             remembers,
             beyond_chain: false,
+            weak: false,
             confidence: 0.8,
             rivals: Vec::new(),
         }
@@ -357,6 +359,10 @@ mod tests {
         assert!(refuted(&[WEAR, FADE], &[FADE], false).is_empty());
         assert_eq!(refuted(&[WEAR], &[FADE], false), [Id::WearDrift]);
         assert!(refuted(&[WEAR], &[LAG], false).is_empty());
+        // Unless there is little to show.
+        let weak = [NameOfForce { weak: true, ..WEAR }];
+        assert_eq!(refuted(&weak, &[], false), [Id::WearDrift]);
+        assert!(refuted(&weak, &weak, false).is_empty());
         assert!(refuted(&[], &[FADE], true).is_empty());
     }
 }

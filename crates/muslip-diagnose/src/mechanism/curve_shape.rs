@@ -29,6 +29,7 @@ impl Describe for CurveShape {
         Facts {
             form,
             fed_by_chain: true,
+            another_curve: true,
             ..Facts::of(
                 Id::CurveShape,
                 Stage::Law,

@@ -193,6 +193,8 @@ pub struct Facts {
     /// Whether a measuring chain leaves what looks like it: kernels that differ, slip's noise that flattens the curve, the
     /// pitch of a ring.
     pub fed_by_chain: bool,
+    /// Whether it is another curve of friction over slip, as any free dependence along the slip is.
+    pub another_curve: bool,
     /// Whether the noise has a part of each run that is like it, an offset of the slip or of the drag: only where runs are
     /// weighed against each other does it show that it is the same in all.
     pub like_noise_of_run: bool,
@@ -221,6 +223,7 @@ impl Facts {
             rare: false,
             filters: false,
             fed_by_chain: false,
+            another_curve: false,
             like_noise_of_run: false,
         }
     }
@@ -269,6 +272,11 @@ pub trait Describe: Send + Sync {
     /// does.
     fn fed_by_chain(&self) -> bool {
         self.facts().fed_by_chain || self.guide().memory == Memory::Kernel
+    }
+    /// Whether these parameters are of what begins where the recordings do: while the brake sets in a measuring chain leaves
+    /// anything.
+    fn begins_with_recordings(&self, _parameters: &[f64]) -> bool {
+        false
     }
     /// Whether these parameters are its own, and not at a limit where its form is another's.
     fn owns(&self, _parameters: &[f64], _context: &Context) -> bool {

@@ -2,6 +2,9 @@
 
 use super::prelude::*;
 
+/// Exponent from which the force no longer grows with the load.
+const LARGEST: f64 = 1.0;
+
 /// Peak friction changes with normal force.
 pub struct LoadSensitivity {
     /// Whether the slip at the peak changes with load too.
@@ -30,6 +33,10 @@ impl Describe for LoadSensitivity {
             all.push(Parameter::new("critical_slip_exponent", "1", -2.0, 2.0));
         }
         all
+    }
+    /// A tyre that brakes less the harder it is pressed down is none, nor one whose friction grows faster than the load.
+    fn owns(&self, parameters: &[f64], _context: &Context) -> bool {
+        parameters[0].abs() < LARGEST
     }
     fn statement(&self, reported: &[Reported<f64>], _p: &[f64]) -> String {
         format!(
@@ -75,5 +82,23 @@ impl<T: Number> Mechanism<T> for LoadSensitivity {
     }
     fn report(&self, p: &[T], _fitted: &Fitted<'_, T>) -> Vec<Reported<T>> {
         vec![Reported::new("load_sensitivity", "1", p[0])]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::innovations::toy::{Noise, stop};
+
+    #[test]
+    fn a_force_that_falls_with_the_load_is_no_tyre_s() {
+        let context = stop(Noise::TYPICAL, 2).context;
+        let owns = |exponent: f64| {
+            let own = LoadSensitivity {
+                with_stiffness: false,
+            };
+            own.owns(&[exponent], &context)
+        };
+        assert!(owns(0.3) && owns(-0.3) && !owns(1.3) && !owns(-1.3));
     }
 }

@@ -162,6 +162,10 @@ impl Describe for SurfacePatch {
         }
         starts
     }
+    fn begins_with_recordings(&self, parameters: &[f64]) -> bool {
+        let stretches = parameters.chunks_exact(3);
+        stretches.map(|own| own[0]).any(|start| start <= 0.0)
+    }
     fn statement(&self, reported: &[Reported<f64>], p: &[f64]) -> String {
         format!(
             "friction is {:.1} % {} from {:.1} m to {:.1} m of the track",
@@ -230,6 +234,13 @@ impl<T: Number> Mechanism<T> for SurfacePatch {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_stretch_from_before_the_recordings_begins_with_them() {
+        let patch = SurfacePatch { patches: 2 };
+        assert!(patch.begins_with_recordings(&[20.0, 5.0, 0.2, -0.5, 4.0, -0.3]));
+        assert!(!patch.begins_with_recordings(&[20.0, 5.0, 0.2, 0.5, 4.0, -0.3]));
+    }
 
     #[test]
     fn edges_of_a_stretch_are_found_to_a_fine_bin() {
