@@ -10,7 +10,7 @@ use crate::chain::correct::Lateness;
 use crate::correction::{Action, Levers, hat};
 use crate::data::{Catalogue, Data};
 use crate::mechanism::{Context, Law, Parameter};
-use crate::model::{Model, TYRE_BASE, Term, tyre};
+use crate::model::{Model, Term, tyre};
 pub use crate::noise::Likelihood;
 use crate::number::finite_or_zero;
 use crate::prepare::prepare;
@@ -421,17 +421,17 @@ impl Repaired {
         self.data_of(series, extra_names)
     }
 
-    /// A run with every channel at the drag's time.
+    /// A run with every channel at the drag's time. Beyond what its late channel tells the law alone slows a coasting vehicle: the one
+    /// beside mechanisms may be any, which they make up for, and each of them has to predict from the same speeds.
     fn in_time(&self, run: &Run) -> Run {
         let mut corrected = self.late.corrected(run);
-        // Beside mechanisms the law may be any, which they make up for.
-        let alone = self.tyre.is_empty() && self.corrections.is_empty();
-        let law = if alone { &self.base } else { &self.base_alone };
-        if self.rig.coasting && law.len() == TYRE_BASE {
+        if let (true, Ok([log_peak, log_critical, ..])) =
+            (self.rig.coasting, law("base_alone", &self.base_alone))
+        {
             let coasting = Coasting {
                 mass_kg: self.rig.mass_kg,
                 radius_m: self.rig.radius_m,
-                law: Law::rudd(law[0].exp(), law[1].exp()),
+                law: Law::rudd(log_peak.exp(), log_critical.exp()),
             };
             coasting.draw_on(run, &self.late, &mut corrected);
         }

@@ -1,8 +1,9 @@
 //! The speed of a coasting vehicle where its late channel has not told it yet, or not any more.
 
-use super::correct::Lateness;
+use super::correct::{Lateness, longest_step, straight_on};
 use super::held::last_reading;
 use crate::campaign::Run;
+use crate::cleaning::clean;
 use crate::mechanism::Law;
 use crate::slip;
 
@@ -20,32 +21,32 @@ pub struct Coasting {
 impl Coasting {
     /// Draws the vehicle's speed of a run that is `corrected` for how `late` its channels are on from its last reading in the run as
     /// recorded: m dv/dt = -load mu(slip), with the wheel's speed and the load as they are. Along a straight line a speed
-    /// that came down to the wheel's has no slip any more, or one against the brake, and the friction of neither.
+    /// that came down to the wheel's has no slip any more, or one against the brake, and the friction of neither. Behind a gap in
+    /// time the straight line stands.
     pub fn draw_on(self, recorded: &Run, late: &Lateness, corrected: &mut Run) {
         let time = &recorded.time_s;
         let Some(last) = last_reading(time, &recorded.vehicle_speed_m_s) else {
             return;
         };
         let told = time.partition_point(|t| t + late.vehicle <= last);
-        let speed = &mut corrected.vehicle_speed_m_s;
-        if late.vehicle <= 0.0 || told == 0 {
+        if late.vehicle <= 0.0 || told == 0 || told == time.len() {
             return;
         }
-        // What is missing stays as it was.
-        let (mut wheel_speed, mut load) = (f64::NAN, f64::NAN);
+        let cleaned =
+            |column: &str, x: &[f64]| clean(&recorded.name, column, time, x, &mut Vec::new()).0;
+        let wheel = cleaned("wheel_speed_rad_s", &corrected.wheel_speed_rad_s);
+        let load = cleaned("normal_force_n", &corrected.normal_force_n);
+        let speed = &mut corrected.vehicle_speed_m_s;
+        let at_last = straight_on(&time[..told], &speed[..told], time[told - 1]);
+        let mut before = at_last.unwrap_or(speed[told - 1]);
+        let longest = longest_step(time);
         for k in told..time.len() {
-            for (own, channel) in [
-                (&mut wheel_speed, &corrected.wheel_speed_rad_s),
-                (&mut load, &corrected.normal_force_n),
-            ] {
-                if channel[k - 1].is_finite() {
-                    *own = channel[k - 1];
-                }
-            }
-            let after = self.after(time[k] - time[k - 1], speed[k - 1], wheel_speed, load);
-            if after.is_finite() {
+            let step = time[k] - time[k - 1];
+            let after = self.after(step, before, wheel[k - 1], load[k - 1]);
+            if step <= longest && after.is_finite() {
                 speed[k] = after;
             }
+            before = speed[k];
         }
     }
 
@@ -109,10 +110,15 @@ mod tests {
         corrected.vehicle_speed_m_s
     }
 
+    /// Deceleration in m/s² by the friction at a slip of one.
+    fn by_locked_wheel() -> f64 {
+        let x = 1.0 / COASTING.law.critical;
+        GRAVITY * 2.0 * COASTING.law.peak * x / (1.0 + x * x)
+    }
+
     #[test]
     fn a_locked_wheel_slows_it_by_its_friction_until_it_rests() {
-        let x = 1.0 / COASTING.law.critical;
-        let slows = GRAVITY * 2.0 * COASTING.law.peak * x / (1.0 + x * x);
+        let slows = by_locked_wheel();
         let speed = |t: f64| (0.15 + slows * (1.0 - t)).max(0.0);
         let drawn = drawn_on(&run(501, speed, |_| 0.0));
         for (k, v) in drawn.iter().enumerate() {
@@ -135,6 +141,24 @@ mod tests {
         let mut missing = let_go;
         missing.normal_force_n[470] = f64::NAN;
         assert!((drawn_on(&missing)[500] - drawn[500]).abs() < 0.01);
+    }
+
+    #[test]
+    fn behind_a_gap_in_time_the_straight_line_stands() {
+        let mut paused = run(501, |t| 20.0 - 6.0 * t, |_| 0.0);
+        for t in &mut paused.time_s[475..] {
+            *t += 2.0;
+        }
+        let late = Lateness {
+            vehicle: LATE,
+            ..Lateness::default()
+        };
+        let straight = late.corrected(&paused).vehicle_speed_m_s[475];
+        let drawn = drawn_on(&paused);
+        assert_eq!(drawn[475], straight);
+        // From there on it slows again.
+        let fell = (drawn[475] - drawn[500]) / (25.0 * STEP);
+        assert!((fell - by_locked_wheel()).abs() < 1e-3, "{fell}");
     }
 
     #[test]

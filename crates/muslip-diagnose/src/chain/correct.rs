@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 use super::held::without_holds;
 use crate::campaign::Run;
 use crate::series::GAP_STEPS;
+use crate::smooth::median_in_place;
 
 /// By how much each channel is late against the drag channel, in s.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -106,11 +107,10 @@ impl Lateness {
     pub fn known(&self, run: &Run) -> Vec<bool> {
         let time = &run.time_s;
         let n = time.len();
-        let mut steps: Vec<f64> = time.windows(2).map(|w| w[1] - w[0]).collect();
-        if steps.is_empty() {
+        if n < 2 {
             return vec![true; n];
         }
-        let longest = GAP_STEPS * crate::smooth::median_in_place(&mut steps);
+        let longest = longest_step(time);
         let brake = run.brake_torque_nm.is_some() || run.brake_pressure_pa.is_some();
         let mut at = 0;
         (0..n)
@@ -134,6 +134,12 @@ impl Lateness {
     }
 }
 
+/// Longest step in s from one time to the next that is no gap.
+pub(super) fn longest_step(time: &[f64]) -> f64 {
+    let mut steps: Vec<f64> = time.windows(2).map(|w| w[1] - w[0]).collect();
+    GAP_STEPS * median_in_place(&mut steps)
+}
+
 /// Moves `at` to the step of time that holds `wanted`, or to the nearest.
 fn bracket(time: &[f64], wanted: f64, at: &mut usize) {
     while *at + 2 < time.len() && time[*at + 1] <= wanted {
@@ -149,8 +155,8 @@ fn bracket(time: &[f64], wanted: f64, at: &mut usize) {
 const SHORTEST_STRETCH_S: f64 = 0.1;
 
 /// A vehicle's speed at a time beyond an end of its recording: on the straight line through its last readings, or its first,
-/// over twice as long a stretch as it lies beyond. It comes to rest, and does not turn round.
-fn straight_on(time: &[f64], x: &[f64], wanted: f64) -> Option<f64> {
+/// over twice as long a stretch as it lies beyond, a tenth of a second at least. It comes to rest, and does not turn round.
+pub(super) fn straight_on(time: &[f64], x: &[f64], wanted: f64) -> Option<f64> {
     let (first, last) = (*time.first()?, *time.last()?);
     let from = wanted.clamp(first, last);
     let stretch = (2.0 * (wanted - from).abs()).max(SHORTEST_STRETCH_S);

@@ -34,7 +34,8 @@ pub(super) struct NameOfForce {
     pub(super) remembers: bool,
     /// Whether it gains more than a measuring chain leaves.
     pub(super) beyond_chain: bool,
-    /// Whether so little speaks for it that the errors of a chain may have chosen it.
+    /// Whether so little speaks for it, where the channels are not known to be free of a chain and in step, that their errors may have
+    /// chosen it.
     pub(super) weak: bool,
     /// Its confidence.
     pub(super) confidence: f64,
