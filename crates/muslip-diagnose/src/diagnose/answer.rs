@@ -34,8 +34,7 @@ pub(super) struct NameOfForce {
     pub(super) remembers: bool,
     /// Whether it gains more than a measuring chain leaves.
     pub(super) beyond_chain: bool,
-    /// Whether so little speaks for it, where the channels are not known to be free of a chain and in step, that their errors may have
-    /// chosen it.
+    /// Whether so little speaks for it that a measuring chain's errors may have chosen it, where one shows or a speed is out of step.
     pub(super) weak: bool,
     /// Its confidence.
     pub(super) confidence: f64,
@@ -150,7 +149,8 @@ impl<'a> Answer<'a> {
     /// Its names that work through the force.
     pub(super) fn names_of_force(&self) -> Vec<NameOfForce> {
         let catalogue = &self.data.catalogue;
-        let chained = !self.timing.untold().unchained;
+        let shown = self.audit.shown();
+        let chained = shown.of_any || shown.of_timing || self.timing.out_of_step();
         let terms = self.decision.chosen.model.terms.iter();
         terms
             .map(|term| (term, catalogue.get(term.entry)))
