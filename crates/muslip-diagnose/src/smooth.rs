@@ -106,6 +106,12 @@ pub fn noise_sigma(time: &[f64], values: &[f64], step_s: f64) -> f64 {
         .fold(fine, f64::max)
 }
 
+/// Median step from one time to the next. `NaN` for fewer than two.
+pub fn median_step(time: &[f64]) -> f64 {
+    let mut steps: Vec<f64> = time.windows(2).map(|w| w[1] - w[0]).collect();
+    median_in_place(&mut steps)
+}
+
 /// Median; reorders its argument. `NaN` for an empty slice.
 pub fn median_in_place(values: &mut [f64]) -> f64 {
     if values.is_empty() {

@@ -35,8 +35,7 @@ pub fn hold(time: &[f64], value: &[f64]) -> Option<Hold> {
     if gaps.len() < HELD_STEPS {
         return None;
     }
-    let mut steps: Vec<f64> = time.windows(2).map(|w| w[1] - w[0]).collect();
-    let step = crate::smooth::median_in_place(&mut steps);
+    let step = crate::smooth::median_step(time);
     let there = value.iter().filter(|x| x.is_finite()).count();
     if moments.len() as f64 > (1.0 - HELD_REPEATS) * there as f64 {
         return None;

@@ -24,12 +24,15 @@ impl Coasting {
     /// that came down to the wheel's has no slip any more, or one against the brake, and the friction of neither. Behind a gap in
     /// time the straight line stands.
     pub fn draw_on(self, recorded: &Run, late: &Lateness, corrected: &mut Run) {
+        if late.vehicle <= 0.0 {
+            return;
+        }
         let time = &recorded.time_s;
         let Some(last) = last_reading(time, &recorded.vehicle_speed_m_s) else {
             return;
         };
         let told = time.partition_point(|t| t + late.vehicle <= last);
-        if late.vehicle <= 0.0 || told == 0 || told == time.len() {
+        if told == 0 || told == time.len() {
             return;
         }
         let cleaned =

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use super::held::without_holds;
 use crate::campaign::Run;
 use crate::series::GAP_STEPS;
-use crate::smooth::median_in_place;
+use crate::smooth::median_step;
 
 /// By how much each channel is late against the drag channel, in s.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -136,8 +136,7 @@ impl Lateness {
 
 /// Longest step in s from one time to the next that is no gap.
 pub(super) fn longest_step(time: &[f64]) -> f64 {
-    let mut steps: Vec<f64> = time.windows(2).map(|w| w[1] - w[0]).collect();
-    GAP_STEPS * median_in_place(&mut steps)
+    GAP_STEPS * median_step(time)
 }
 
 /// Moves `at` to the step of time that holds `wanted`, or to the nearest.

@@ -7,7 +7,7 @@ use crate::campaign::Run;
 use crate::cleaning::stretches;
 use crate::constants::LEAST_REPEATED;
 use crate::series::GAP_STEPS;
-use crate::smooth::median_in_place;
+use crate::smooth::{median_in_place, median_step};
 
 /// A stand of so many typical ones is a standstill, or a speed that does not change.
 const LONG_STAND: f64 = 3.0;
@@ -52,8 +52,7 @@ fn parts(time: &[f64], x: &[f64]) -> Vec<(Range<usize>, Vec<Reading>)> {
         return Vec::new();
     }
     let period = hold(time, x).map(|hold| hold.period_s);
-    let mut steps: Vec<f64> = time.windows(2).map(|w| w[1] - w[0]).collect();
-    let step = median_in_place(&mut steps);
+    let step = median_step(time);
     let gaps = after(&|k| time[k] - time[k - 1] > GAP_STEPS * step);
     let with_readings = between(&gaps).into_iter().filter_map(|part| {
         let stands = between(&changes[part.clone()]);
