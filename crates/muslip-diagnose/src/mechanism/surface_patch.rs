@@ -5,6 +5,9 @@ use super::prelude::*;
 /// Longest stretches that are searched for, as shares of the track.
 const LONGEST: [f64; 3] = [1.0, 0.35, 0.12];
 
+/// Farthest that a reading counts, in standard deviations of all that is left: a stray one is no stretch.
+const FARTHEST_STDS: f64 = 4.0;
+
 /// Search over stretches of track: residual against predicted drag, by bins of distance, first coarsely.
 #[derive(Clone)]
 struct Scan {
@@ -23,6 +26,16 @@ struct Stretch {
     gain: f64,
 }
 
+/// Standard deviation of what is left, in those of the drag's sensor.
+fn spread(evidence: &[Residuals]) -> f64 {
+    let squares = evidence.iter().flat_map(|e| {
+        let weighed = e.residual.iter().zip(&e.weight);
+        weighed.filter(|(_, w)| **w > 0.0).map(|(r, w)| r * r * w)
+    });
+    let (sum, count) = squares.fold((0.0, 0.0), |(sum, count), x| (sum + x, count + 1.0));
+    f64::sqrt(sum / f64::max(count, 1.0))
+}
+
 impl Scan {
     /// Bins of the search, and fine ones in each of these: an edge that starts farther from its place than it is wide has no
     /// slope to follow.
@@ -39,13 +52,14 @@ impl Scan {
             cross: vec![0.0; Self::BINS + 1],
             power: vec![0.0; Self::BINS + 1],
         };
+        let farthest = FARTHEST_STDS * spread(evidence).max(1.0);
         for (run, e) in series.iter().zip(evidence) {
             for k in 0..run.len() {
                 let b = ((run.distance[k] / bin) as usize).min(Self::BINS - 1);
                 let (f, w) = (e.predicted[k], e.weight[k]);
                 if w > 0.0 {
-                    scan.cross[b + 1] +=
-                        w * f * e.residual[k].clamp(-4.0 / w.sqrt(), 4.0 / w.sqrt());
+                    let most = farthest / w.sqrt();
+                    scan.cross[b + 1] += w * f * e.residual[k].clamp(-most, most);
                     scan.power[b + 1] += w * f * f;
                 }
             }
