@@ -3,6 +3,7 @@
 use crate::data::{Catalogue, Listed};
 use crate::mechanism::{Context, Law, Stage, State};
 use crate::number::Number;
+use crate::prepare::mean_twice_about;
 use crate::series::{Channel, Series};
 use crate::slip::slip;
 
@@ -244,12 +245,39 @@ pub fn tyre<T: Listed>(
     {
         state.contact = Some(state.force.clone());
         run(Stage::Reading, &mut state);
-        for stage in [Stage::Structure, Stage::Filter, Stage::Line, Stage::Input] {
-            run(stage, &mut state);
-        }
+        let mut ids = terms.iter();
+        let filters = ids.any(|(entry, _)| filters_reading(catalogue, *entry));
+        let entered = filters.then(|| state.force.clone());
+        let pass = |state: &mut State<T>| {
+            for stage in FILTERED_BEHIND_CONTACT {
+                run(stage, state);
+            }
+        };
+        pass(&mut state);
+        state.filtered_noise = entered.map(|entered| {
+            let mut quiet = State::empty();
+            quiet.force = mean_twice_about(&series.time, &entered, &series.tyre, FAST_S);
+            let slow = quiet.force.clone();
+            pass(&mut quiet);
+            let noise = |k: usize| (state.force[k] - entered[k]) - (quiet.force[k] - slow[k]);
+            (0..n).map(noise).collect()
+        });
+        run(Stage::Input, &mut state);
     }
     state
 }
+
+/// Stages between contact and reading at which filters stand, in their order.
+const FILTERED_BEHIND_CONTACT: [Stage; 3] = [Stage::Structure, Stage::Filter, Stage::Line];
+
+/// Whether a mechanism filters the force between contact and reading.
+fn filters_reading(catalogue: &Catalogue, entry: usize) -> bool {
+    let facts = catalogue.get(entry).facts();
+    facts.filters && FILTERED_BEHIND_CONTACT.contains(&facts.stage)
+}
+
+/// Reach in s of the means twice over that leave out of the force what is fast in it: mostly the slip's noise.
+const FAST_S: f64 = 0.005;
 
 /// Stages between the slip and the reading at which filters stand, in their order.
 const FILTERED_AT: [Stage; 5] = [

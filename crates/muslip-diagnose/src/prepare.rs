@@ -7,6 +7,7 @@ use core::ops::Range;
 
 use crate::campaign::{Rig, Run};
 use crate::cleaning::{clean, stretches};
+use crate::number::Number;
 use crate::series::{Channel, DataFault, GAP_STEPS, Series};
 use crate::slip::slip;
 use crate::smooth::{Smoothed, difference_sigma, median_in_place, noise_sigma, smooth};
@@ -77,11 +78,17 @@ fn channel(
 
 /// Mean over so many seconds on either side, as many samples on one as on the other; the ends keep what they have.
 #[must_use]
-pub fn mean_about(time: &[f64], x: &[f64], segments: &[Range<usize>], reach: f64) -> Vec<f64> {
+pub fn mean_about<T: Number>(
+    time: &[f64],
+    x: &[T],
+    segments: &[Range<usize>],
+    reach: f64,
+) -> Vec<T> {
     let mut out = x.to_vec();
-    let mut sums = vec![0.0; x.len() + 1];
+    let nothing = T::constant(0.0);
+    let mut sums = vec![nothing; x.len() + 1];
     for (k, v) in x.iter().enumerate() {
-        sums[k + 1] = sums[k] + if v.is_finite() { *v } else { 0.0 };
+        sums[k + 1] = sums[k] + if v.value().is_finite() { *v } else { nothing };
     }
     for segment in segments {
         let Some(last) = segment.clone().last() else {
@@ -102,12 +109,12 @@ pub fn mean_about(time: &[f64], x: &[f64], segments: &[Range<usize>], reach: f64
 
 /// The mean of [`mean_about`], taken twice: weights that fall off to both sides.
 #[must_use]
-pub fn mean_twice_about(
+pub fn mean_twice_about<T: Number>(
     time: &[f64],
-    x: &[f64],
+    x: &[T],
     segments: &[Range<usize>],
     reach: f64,
-) -> Vec<f64> {
+) -> Vec<T> {
     let once = mean_about(time, x, segments, reach);
     mean_about(time, &once, segments, reach)
 }

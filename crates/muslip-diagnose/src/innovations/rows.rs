@@ -206,16 +206,28 @@ struct Force<'a, T> {
     quiet: Option<Vec<f64>>,
 }
 
+/// What a model says that the load cell adds to the force in the contact, in N. What its filters take is made of the force
+/// smoothed to both sides: integrated, the noise of the slip stays in every level, times their delay, and none but the
+/// shortest delays paid for that.
+fn added_by_load_cell<T: Number>(tyre: &State<T>, contact: &[T]) -> Vec<T> {
+    let both = zip(&tyre.force, contact);
+    let mut added: Vec<T> = both.map(|(force, contact)| *force - *contact).collect();
+    if let Some(less) = &tyre.filtered_noise {
+        for (added, less) in added.iter_mut().zip(less) {
+            *added = *added - *less;
+        }
+    }
+    added
+}
+
 impl<'a, T: Number> Force<'a, T> {
     fn new(series: &'a Series, tyre: &State<T>, scaled: bool) -> Self {
         let quiet = || {
             let by_model: Vec<f64> = tyre.force.iter().map(|f| f.value()).collect();
             calibrated_force(series, &by_model)
         };
-        let added = tyre.contact.as_ref().map(|contact| {
-            let samples = 0..series.len();
-            samples.map(|k| tyre.force[k] - contact[k]).collect()
-        });
+        let contact = tyre.contact.as_ref();
+        let added = contact.map(|contact| added_by_load_cell(tyre, contact));
         Self {
             series,
             added,
@@ -367,5 +379,26 @@ mod tests {
         let judged = judge(&data, &model, &[], Guess::None, EFFORT).unwrap();
         let gain = 1.0 + judged.model.terms[0].parameters[0];
         assert!((gain - 1.2).abs() < 0.02, "{gain}");
+    }
+
+    #[test]
+    fn what_filters_add_holds_little_of_the_slip_s_noise() {
+        let (data, exact) = (stop(Noise::TYPICAL, 4), stop(Noise::NONE, 4));
+        let model = with_term(&data, &settled(&data), Id::ForceDelay, 0.012);
+        let added = |data: &Data, quiet: bool| {
+            let (p, series) = (model.vector(), &data.series[0]);
+            let mut state = tyre::<f64>(&data.catalogue, &model, &p, series, &data.context);
+            if !quiet {
+                state.filtered_noise = None;
+            }
+            added_by_load_cell(&state, state.contact.as_ref().unwrap())
+        };
+        let truth = added(&exact, false);
+        let off = |own: &[f64]| rms(&data.series[0], |k| own[k] - truth[k]);
+        let (quiet, loud) = (off(&added(&data, true)), off(&added(&data, false)));
+        assert!(quiet < 0.85 * loud, "{quiet} {loud}");
+        let blurred = added(&exact, true);
+        let (blurred, all) = (off(&blurred), rms(&exact.series[0], |k| truth[k]));
+        assert!(blurred < 0.1 * all, "{blurred} {all}");
     }
 }

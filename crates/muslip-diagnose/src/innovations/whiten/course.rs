@@ -25,6 +25,8 @@ pub struct Course {
 pub struct Step {
     pub(super) row: [f64; MOST],
     pub(super) dt: f64,
+    /// Last part of it over which the reading is a mean of the walk, in s; nothing where it is a level of its own.
+    pub(super) meant: f64,
     decay: u32,
     /// Whether nothing is known of the level before this reading.
     pub(super) fresh: bool,
@@ -34,6 +36,7 @@ pub struct Step {
 pub const NOTHING: Step = Step {
     row: [0.0; MOST],
     dt: 0.0,
+    meant: 0.0,
     decay: u32::MAX,
     fresh: false,
 };
@@ -147,6 +150,11 @@ impl Course {
                 out.steps.push(Step {
                     row: row_of(parts, out.filtered.as_ref(), k),
                     dt,
+                    meant: if walk && !fresh {
+                        f64::min(time[k] - time[k - 1], dt)
+                    } else {
+                        0.0
+                    },
                     decay: decay as u32,
                     fresh,
                 });
@@ -183,6 +191,16 @@ impl Course {
             all[TWIN] = second;
         }
         all
+    }
+
+    /// Variance of the walk over a second, where there is one.
+    #[inline(always)]
+    pub(super) fn walked(&self, sizes: &Sizes) -> f64 {
+        if self.kinds[0] == Kind::Walk {
+            sizes.variance(0)
+        } else {
+            0.0
+        }
     }
 
     /// What a unit of each part's variance adds before a reading.

@@ -12,7 +12,9 @@ pub enum Kind {
     /// Stays what it is over a run.
     Constant,
     /// The level that all integrated parts enter, itself driven by white noise: its standard deviation grows with
-    /// the root of time. Nothing is known of it at the start and after a gap. At most one a balance, the first part.
+    /// the root of time. Nothing is known of it at the start and after a gap. At most one a balance, the first part. Readings are
+    /// means of it over the time since the one before: as points they would seem to be alike from one to the next, and a
+    /// drag that is late or lags would explain it.
     Walk,
     /// Forgets with this time constant in s and is integrated into the walk.
     Integrated(f64),
@@ -26,6 +28,10 @@ pub const APART: f64 = 1.2;
 
 /// The second state of filtered noise is the last one.
 pub const TWIN: usize = MOST - 1;
+
+/// What a mean of a walk over a time has of the walk's variance over it, and shares with where the walk is at its end: white
+/// noise comes into a mean by what is left of the time.
+pub const MEAN_OF_WALK: [f64; 2] = [1.0 / 3.0, 0.5];
 
 /// Filtered noise is the difference of two parts that one white noise drives, each forgetting with one of the poles.
 #[derive(Clone, Copy)]

@@ -52,6 +52,26 @@ fn dense(time: &[f64], segments: &[core::ops::Range<usize>], parts: &[Part<'_>])
         }
     }
     let mut add = |effect: &DVector<f64>| covariance += effect * effect.transpose();
+    for part in parts.iter().filter(|part| part.kind == Kind::Walk) {
+        // A walk of which each reading is the mean over the time since the one before: that is a half of how far it went,
+        // and what is independent of that.
+        for (i, &k) in used.iter().enumerate() {
+            if starts.contains(&k) {
+                continue;
+            }
+            let std = part.std * (time[k] - time[used[i - 1]]).sqrt();
+            let behind = |j: usize| !starts.iter().any(|s| *s > k && *s <= used[j]);
+            let going = DVector::from_fn(n, |j, _| match j {
+                j if j == i => 0.5 * std,
+                j if j > i && behind(j) => std,
+                _ => 0.0,
+            });
+            add(&going);
+            add(&DVector::from_fn(n, |j, _| {
+                if j == i { std / 12f64.sqrt() } else { 0.0 }
+            }));
+        }
+    }
     for part in parts {
         for cause in 0..n {
             let mut effect = DVector::zeros(n);
@@ -81,8 +101,6 @@ fn dense(time: &[f64], segments: &[core::ops::Range<usize>], parts: &[Part<'_>])
                     Kind::Walk => {
                         if starts.contains(&k) {
                             x = here * (WHITE * WHITE * DIFFUSE).sqrt();
-                        } else {
-                            x += here * part.std * dt.sqrt();
                         }
                     }
                     Kind::Integrated(tau) => {

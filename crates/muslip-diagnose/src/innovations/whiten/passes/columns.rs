@@ -5,7 +5,7 @@ use pulp::{Simd, WithSimd};
 
 use crate::innovations::whiten::course::Sizes;
 use crate::innovations::whiten::lanes::{LANES, Lane};
-use crate::innovations::whiten::part::{MOST, TWIN};
+use crate::innovations::whiten::part::{MEAN_OF_WALK, MOST, TWIN};
 use crate::innovations::whiten::{ByVariance, Whitener};
 
 /// States of `G` groups of columns.
@@ -98,6 +98,17 @@ fn times(a: &Lane, b: &Lane) -> Lane {
     core::array::from_fn(|l| a[l] * b[l])
 }
 
+/// What a reading explains of a unit of the walk's variance by being a mean of it and not where it ends, beside what the end
+/// does: by the column over its covariance, and by how the walk's end is pushed by later readings.
+#[inline(always)]
+fn mean_for_end(u: &Lane, later: &Lane, meant: f64) -> Lane {
+    let [own, shared] = MEAN_OF_WALK;
+    core::array::from_fn(|l| {
+        let less = (1.0 - own) * u[l] + 2.0 * (1.0 - shared) * later[l];
+        -meant * u[l] * less
+    })
+}
+
 impl<const LAST: bool> WithSimd for Squares<'_, LAST> {
     type Output = ();
 
@@ -118,6 +129,12 @@ impl<const LAST: bool> WithSimd for Squares<'_, LAST> {
             out[0].white += rest;
             if LAST {
                 out[1].white += last;
+            }
+            let mean = mean_for_end(&u, &s[0], step.meant);
+            let [rest, last] = across::<LAST>(&mean);
+            out[0].parts[0] += rest;
+            if LAST {
+                out[1].parts[0] += last;
             }
             for i in 0..MOST {
                 for l in 0..LANES {
@@ -164,33 +181,42 @@ pub struct Expected<'a> {
     pub innovations: &'a [f64],
 }
 
+/// What the readings from one on say of what drove the states before it, for units of variance.
+#[derive(Clone, Copy, Default)]
+struct Pushed {
+    /// By how much each state was pushed.
+    states: [f64; MOST],
+    /// By how much the walk's end was, beyond the mean that was read.
+    still_to_come: f64,
+    /// The column over its covariance.
+    own: f64,
+}
+
 impl WithSimd for Expected<'_> {
     /// By reading: of the parts, then of the readings' own noise.
     type Output = Vec<[f64; MOST + 1]>;
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, _simd: S) -> Self::Output {
-        let (pushed, own) = self.pushed();
-        self.followed(&pushed, &own)
+        let pushed = self.pushed();
+        self.followed(&pushed)
     }
 }
 
 impl Expected<'_> {
-    /// Back over the readings: by how much each state is pushed before each reading, for a unit of its variance, and the
-    /// column over its covariance.
+    /// Back over the readings.
     #[inline(always)]
-    fn pushed(&self) -> (Vec<[f64; MOST]>, Vec<f64>) {
+    fn pushed(&self) -> Vec<Pushed> {
         let Whitener { course, found } = self.whitener;
         let n = course.steps.len();
-        let mut pushed = vec![[0.0; MOST]; n];
-        let mut own = vec![0.0; n];
+        let mut pushed = vec![Pushed::default(); n];
         let mut s = [0.0; MOST];
         for (at, step) in course.steps.iter().enumerate().rev() {
             let mut u = self.innovations[at] * found.inverse[at];
             for i in 0..MOST {
                 u -= found.gains[at][i] * s[i];
             }
-            own[at] = u;
+            let later = s[0];
             for i in 0..MOST {
                 s[i] += step.row[i] * u;
             }
@@ -198,24 +224,31 @@ impl Expected<'_> {
                 s[0] = 0.0;
             }
             let driven = course.driven(at, step);
-            pushed[at] = core::array::from_fn(|i| driven[i] * s[i]);
+            let mut states: [f64; MOST] = core::array::from_fn(|i| driven[i] * s[i]);
             if let Some(pair) = &course.filtered {
                 let shared = 0.5 * course.driven_together(at, step);
-                pushed[at][pair.at] += shared * s[TWIN];
-                pushed[at][TWIN] += shared * s[pair.at];
+                states[pair.at] += shared * s[TWIN];
+                states[TWIN] += shared * s[pair.at];
             }
+            let [own, shared] = MEAN_OF_WALK;
+            states[0] -= step.meant * (1.0 - shared) * u;
+            pushed[at] = Pushed {
+                states,
+                still_to_come: step.meant * ((shared - own) * u + (1.0 - shared) * later),
+                own: u,
+            };
             let decay = course.decay_of(step);
             let level = s[0];
             for i in 0..MOST {
                 s[i] = s[i] * decay[i] + course.integrated[i] * step.dt * level;
             }
         }
-        (pushed, own)
+        pushed
     }
 
     /// Forward: what enters each reading by each part that is pushed so.
     #[inline(always)]
-    fn followed(&self, pushed: &[[f64; MOST]], own: &[f64]) -> Vec<[f64; MOST + 1]> {
+    fn followed(&self, pushed: &[Pushed]) -> Vec<[f64; MOST + 1]> {
         let course = &self.whitener.course;
         let variance: [f64; MOST] = core::array::from_fn(|i| match &course.filtered {
             Some(pair) if i == TWIN => self.sizes.variance(pair.at),
@@ -223,14 +256,14 @@ impl Expected<'_> {
         });
         let white = self.sizes.white * self.sizes.white;
         let (mut state, mut level) = ([0.0; MOST], [0.0; MOST]);
-        let readings = course.steps.iter().zip(pushed).zip(own);
+        let readings = course.steps.iter().zip(pushed);
         readings
-            .map(|((step, pushed), own)| {
+            .map(|(step, pushed)| {
                 let decay = course.decay_of(step);
                 let mut out = [0.0; MOST + 1];
                 for i in 0..MOST {
                     level[i] += course.integrated[i] * step.dt * state[i];
-                    state[i] = decay[i] * state[i] + variance[i] * pushed[i];
+                    state[i] = decay[i] * state[i] + variance[i] * pushed.states[i];
                 }
                 if step.fresh {
                     level = [0.0; MOST];
@@ -242,7 +275,8 @@ impl Expected<'_> {
                 if let Some(pair) = &course.filtered {
                     out[pair.at] += core::mem::take(&mut out[TWIN]);
                 }
-                out[MOST] = white * own;
+                out[0] -= variance[0] * pushed.still_to_come;
+                out[MOST] = white * pushed.own;
                 out
             })
             .collect()

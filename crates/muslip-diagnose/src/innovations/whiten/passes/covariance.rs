@@ -4,7 +4,7 @@ use pulp::{Simd, WithSimd};
 
 use super::{ByRun, States, longest, steps_at};
 use crate::innovations::whiten::course::{Course, Sizes};
-use crate::innovations::whiten::part::{Kind, MOST, TWIN};
+use crate::innovations::whiten::part::{Kind, MEAN_OF_WALK, MOST, TWIN};
 
 /// What the pass finds of one run.
 #[derive(Default)]
@@ -50,7 +50,8 @@ impl<const R: usize> WithSimd for Covariance<'_, R> {
                 }
             }
             let row: States<R> = core::array::from_fn(|i| steps.map(|step| step.row[i]));
-            let (gain, variance) = p.update(&row, sizes.white * sizes.white);
+            let meant = steps.map(|step| first.walked(sizes) * step.meant);
+            let (gain, variance) = p.update(&row, sizes.white * sizes.white, &meant);
             let inverse = variance.map(|v| 1.0 / v.sqrt());
             for (r, found) in found.iter_mut().enumerate() {
                 if at < courses[r].steps.len() {
@@ -162,9 +163,10 @@ impl<const R: usize> Lower<R> {
         self.0[0][0][run] = diffuse;
     }
 
-    /// Takes a reading up; the gains, and the variance of the reading's innovation.
+    /// Takes a reading up, a mean of a walk that has this variance over its time; the gains, and the variance of the reading's
+    /// innovation.
     #[inline(always)]
-    fn update(&mut self, row: &States<R>, noise: f64) -> (States<R>, ByRun<R>) {
+    fn update(&mut self, row: &States<R>, noise: f64, meant: &ByRun<R>) -> (States<R>, ByRun<R>) {
         let p = &mut self.0;
         let mut ph = [[0.0; R]; MOST];
         for j in 0..MOST {
@@ -180,6 +182,11 @@ impl<const R: usize> Lower<R> {
             for r in 0..R {
                 variance[r] += row[i][r] * ph[i][r];
             }
+        }
+        let [own, shared] = MEAN_OF_WALK;
+        for r in 0..R {
+            variance[r] -= (1.0 - own) * meant[r];
+            ph[0][r] -= (1.0 - shared) * meant[r];
         }
         let variance = variance.map(|v| v.max(1e-30));
         let inverse = variance.map(|v| 1.0 / v);

@@ -2,7 +2,7 @@
 
 use pulp::{Simd, WithSimd};
 
-use crate::innovations::whiten::part::{MOST, TWIN};
+use crate::innovations::whiten::part::{MEAN_OF_WALK, MOST, TWIN};
 use crate::innovations::whiten::{ByVariance, Whitener};
 
 /// The pass back of [`crate::innovations::whiten::traces`] over `R` runs: each waits for itself at every reading, and is
@@ -67,6 +67,8 @@ impl<'a> Back<'a> {
             d += gain[i] * w[i];
         }
         self.out.white += d;
+        let [own, shared] = MEAN_OF_WALK;
+        self.out.parts[0] += step.meant * (2.0 * (1.0 - shared) * w[0] - (1.0 - own) * d);
         for i in 0..MOST {
             for j in 0..MOST {
                 s[i][j] += row[i] * row[j] * d - row[i] * w[j] - w[i] * row[j];
