@@ -6,7 +6,7 @@ use crate::audit::{Audit, Shown, Timing as Late};
 use crate::constants::{
     ALIKE_LATE, ALIKE_LATE_S, AUDIT_REACH, FAR_BETTER, HEARD_S, IN_STEP_S, LATE_STDS,
     LEAST_BRAKE_EARLY_IN_STEP_S, LEAST_BRAKE_EARLY_S, LEAST_DRAG_LATE_S,
-    LEAST_DRAG_LATE_UNCHAINED_S, LEAST_STDS_TOLD, UNKNOWN_STDS, VAGUE_AUDIT_S, VAGUE_S,
+    LEAST_DRAG_LATE_UNCHAINED_S, LEAST_STDS_TOLD, SURE_DELAY, UNKNOWN_STDS, VAGUE_AUDIT_S, VAGUE_S,
 };
 
 /// Shifts are refined so often at most.
@@ -215,15 +215,16 @@ impl Timing {
     fn all_in_step(&self) -> bool {
         let speeds = [self.wheel, self.vehicle];
         let known = speeds.iter().any(|late| late.std < VAGUE_S);
-        known && !self.out_of_step() && !heard_out_of_step(self.brake)
+        let all = [self.wheel, self.vehicle, self.brake];
+        known && !all.into_iter().any(heard_out_of_step)
     }
 
-    /// Whether a speed is out of step with the drag, as it was left.
+    /// Whether a speed is surely out of step with the drag, as it was left.
     #[must_use]
-    pub fn out_of_step(&self) -> bool {
-        [self.wheel, self.vehicle]
-            .into_iter()
-            .any(heard_out_of_step)
+    pub fn surely_out_of_step(&self) -> bool {
+        let surely =
+            |late: Late| late.std < HEARD_S && late.value.abs() > IN_STEP_S + SURE_DELAY * late.std;
+        [self.wheel, self.vehicle].into_iter().any(surely)
     }
 
     /// What the timing does not tell of the chain.
@@ -457,6 +458,14 @@ mod tests {
         assert!((held.untold().drag_s - 0.0019).abs() < 1e-9);
         // Speeds that are late say nothing of the drag.
         assert!(timing(0.010, 0.030, 0.0).untold().drag_s < 1e-9);
+    }
+
+    #[test]
+    fn a_lateness_that_is_hardly_told_sets_no_speed_surely_out_of_step() {
+        let mut vague = timing(0.0, 0.018, 0.0);
+        assert!(vague.surely_out_of_step());
+        vague.vehicle.std = 0.004;
+        assert!(!vague.surely_out_of_step() && !vague.all_in_step());
     }
 
     #[test]

@@ -20,8 +20,10 @@ pub fn of_name(data: &Data, base: &Judged, id: Id, nats: f64, t: f64) -> Trial {
         own: true,
         says_as_well: None,
         fed_by_chain: false,
+        by_load_as_read: false,
         of_tyre: false,
         remembers: false,
+        rings: false,
         lasts: true,
         outlasts_chain: true,
         beside_chain: true,
@@ -29,6 +31,7 @@ pub fn of_name(data: &Data, base: &Judged, id: Id, nats: f64, t: f64) -> Trial {
         size: f64::INFINITY,
         predicts: 0.2,
         unanimous: [false, false],
+        without_best: [0.0, 0.0],
         judged: base.clone().without_columns(),
     }
 }

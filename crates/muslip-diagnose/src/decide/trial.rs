@@ -86,10 +86,14 @@ pub struct Trial {
     pub says_as_well: Option<Id>,
     /// Whether a measuring chain leaves what looks like it.
     pub fed_by_chain: bool,
+    /// Whether it goes by the load as read.
+    pub by_load_as_read: bool,
     /// Whether it is the tyre's.
     pub of_tyre: bool,
     /// Whether it is a memory: what was before counts.
     pub remembers: bool,
+    /// Whether it rings, longer than any filter of a measuring chain.
+    pub rings: bool,
     /// Whether that is as long as a recording can show.
     pub lasts: bool,
     /// Whether its memory is longer than what the chain's own timing was off by, and no longer than the channels show.
@@ -106,6 +110,8 @@ pub struct Trial {
     pub predicts: f64,
     /// Whether no unseen run speaks against it, at the noise as fitted and at the sensors'.
     pub unanimous: [bool; 2],
+    /// What all unseen runs gain but the one that gains most, in nats, at both.
+    pub without_best: [f64; 2],
     /// The model with it.
     pub judged: Judged,
 }
@@ -182,6 +188,11 @@ fn may_leave(memory_of_force: bool, fed_by_chain: Option<bool>) -> bool {
 fn unanimous(gains: &[f64]) -> bool {
     let sum_of = |sign: f64| gains.iter().map(|g| (sign * g).max(0.0)).sum::<f64>();
     gains.len() > 1 && sum_of(-1.0) < MOST_AGAINST * sum_of(1.0)
+}
+
+/// The sum of these without the largest.
+fn without_best(gains: &[f64]) -> f64 {
+    gains.iter().sum::<f64>() - gains.iter().copied().fold(0.0, f64::max)
 }
 
 /// A memory, beside what the chain remembers.
@@ -285,9 +296,12 @@ impl<'a> Before<'a> {
             }),
             // No chain feeds a memory of what was left to be explained because none shows.
             fed_by_chain: fed_by_chain == Some(true) && !of_left,
+            by_load_as_read: mechanism
+                .is_some_and(|(_, entry)| data.catalogue.get(entry).facts().by_load_as_read),
             of_tyre: mechanism
                 .is_some_and(|(_, entry)| data.catalogue.get(entry).guide().kind == Kind::Tyre),
             remembers: remembered.is_some(),
+            rings: term.is_some_and(|term| data.catalogue.get(term.entry).rings(&term.parameters)),
             lasts: remembered.as_ref().is_none_or(|memory| memory.lasts),
             outlasts_chain: remembered.is_none_or(|memory| memory.outlasts_chain),
             beside_chain: true,
@@ -295,6 +309,7 @@ impl<'a> Before<'a> {
             readings,
             size,
             unanimous: [&own_gains, &gains_at_sensors].map(|gains| unanimous(gains)),
+            without_best: [&own_gains, &gains_at_sensors].map(|gains| without_best(gains)),
             judged: judged.without_columns(),
             claim,
         }

@@ -150,7 +150,7 @@ impl<'a> Answer<'a> {
     pub(super) fn names_of_force(&self) -> Vec<NameOfForce> {
         let catalogue = &self.data.catalogue;
         let shown = self.audit.shown();
-        let chained = shown.of_any || shown.of_timing || self.timing.out_of_step();
+        let chained = shown.of_any || shown.of_timing || self.timing.surely_out_of_step();
         let terms = self.decision.chosen.model.terms.iter();
         terms
             .map(|term| (term, catalogue.get(term.entry)))

@@ -193,6 +193,8 @@ pub struct Facts {
     /// Whether a measuring chain leaves what looks like it: kernels that differ, slip's noise that flattens the curve, the
     /// pitch of a ring.
     pub fed_by_chain: bool,
+    /// Whether it goes by the load as read, whose errors are no force: it has to predict the drag clearly.
+    pub by_load_as_read: bool,
     /// Whether it is another curve of friction over slip, as any free dependence along the slip is.
     pub another_curve: bool,
     /// Whether the noise has a part of each run that is like it, an offset of the slip or of the drag: only where runs are
@@ -223,6 +225,7 @@ impl Facts {
             rare: false,
             filters: false,
             fed_by_chain: false,
+            by_load_as_read: false,
             another_curve: false,
             like_noise_of_run: false,
         }
@@ -272,6 +275,10 @@ pub trait Describe: Send + Sync {
     /// does.
     fn fed_by_chain(&self) -> bool {
         self.facts().fed_by_chain || self.guide().memory == Memory::Kernel
+    }
+    /// Whether it rings at these parameters, longer than any filter of a measuring chain does.
+    fn rings(&self, _parameters: &[f64]) -> bool {
+        false
     }
     /// Whether these parameters are of what begins where the recordings do: while the brake sets in a measuring chain leaves
     /// anything.

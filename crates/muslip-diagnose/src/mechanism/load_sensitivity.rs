@@ -20,6 +20,7 @@ impl Describe for LoadSensitivity {
         };
         Facts {
             form,
+            by_load_as_read: true,
             ..Facts::of(
                 Id::LoadSensitivity,
                 Stage::Law,

@@ -48,8 +48,10 @@ impl Describe for StructuralResonance {
         let omega = core::f64::consts::TAU * p.first()?;
         let damping = p.get(1).copied().unwrap_or(1.0);
         // What rings remembers as long as it rings.
-        let rings = damping < RINGING;
-        Some(1.0 / (omega * if rings { damping } else { 1.0 }))
+        Some(1.0 / (omega * if self.rings(p) { damping } else { 1.0 }))
+    }
+    fn rings(&self, p: &[f64]) -> bool {
+        p.get(1).is_some_and(|damping| *damping < RINGING)
     }
     fn parameters(&self, context: &Context) -> Vec<Parameter> {
         let mut all = vec![
