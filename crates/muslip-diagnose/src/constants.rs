@@ -41,7 +41,7 @@ pub const LARGE_GAIN_ON_UNSEEN: f64 = 300.0;
 /// of [`LEAST_T_NOT_FED`].
 pub const LARGE_GAIN_NOT_FED: f64 = 60.0;
 /// Gain on all unseen runs together, nats, at both levels of the noise, from which what rings longer than any filter of a chain need
-/// not gain alike, for few runs excite it: of 352 development campaigns that lack nothing, 208 behind chains, none has a mode of
+/// not gain alike, for few runs excite it; [`LARGE_TO_WORTH`] holds, too. Of 352 development campaigns that lack nothing, 208 behind chains, none has a mode of
 /// such damping with more than 50.
 pub const LARGE_GAIN_OF_RING: f64 = 100.0;
 /// Gain on all unseen runs together, nats, at both levels of the noise, from which a lag of the brake is one however its
@@ -116,7 +116,7 @@ pub const DOUBTED: f64 = 0.5;
 /// 0.86, and a true one of 0.98 did not come out again.
 pub const BEYOND_REFUTATION: f64 = 0.9;
 /// What speaks for a name that is no memory, nats, below which it has to come out without the kept runs, too, where a chain shows or a
-/// speed is out of step: what so little speaks for may be chosen by the errors of the runs (stability selection: Meinshausen and
+/// speed is surely out of step: what so little speaks for may be chosen by the errors of the runs (stability selection: Meinshausen and
 /// Buhlmann 2010, J. R. Stat. Soc. B 72). Of five names that do not on 590 development campaigns behind chains, 174 with one
 /// effect, four are false and one is of 0.3 sigma.
 pub const WEAK_NATS: f64 = 16.0;
@@ -247,7 +247,8 @@ pub const LEAST_RELIABLE: f64 = 0.02;
 /// Standard deviations by which a vehicle's lateness has to differ from the wheel's before a fresh run's speeds are moved
 /// against each other.
 pub const LEAST_STDS_TOLD: f64 = 2.0;
-/// A delay is named where it is so many standard deviations from none, beyond [`FORM_OF_DELAY_S`].
+/// A delay is named where it is so many standard deviations from none, beyond [`FORM_OF_DELAY_S`], and a speed is surely out of step
+/// where it is, beyond [`IN_STEP_S`].
 pub const SURE_DELAY: f64 = 5.0;
 /// What a delay may be off by because channels differ in the form of their kernels, too, s: of six development campaigns
 /// whose wheel speed was named late and is not, four were within it.

@@ -1,5 +1,7 @@
 //! The simulation: the base law with any set of mechanisms, run on one recording.
 
+use core::iter::zip;
+
 use crate::data::{Catalogue, Listed};
 use crate::mechanism::{Context, Law, Stage, State};
 use crate::number::Number;
@@ -245,23 +247,13 @@ pub fn tyre<T: Listed>(
     {
         state.contact = Some(state.force.clone());
         run(Stage::Reading, &mut state);
-        let mut ids = terms.iter();
-        let filters = ids.any(|(entry, _)| filters_reading(catalogue, *entry));
-        let entered = filters.then(|| state.force.clone());
-        let pass = |state: &mut State<T>| {
-            for stage in FILTERED_BEHIND_CONTACT {
-                run(stage, state);
-            }
-        };
-        pass(&mut state);
-        state.filtered_noise = entered.map(|entered| {
-            let mut quiet = State::empty();
-            quiet.force = mean_twice_about(&series.time, &entered, &series.tyre, FAST_S);
-            let slow = quiet.force.clone();
-            pass(&mut quiet);
-            let noise = |k: usize| (state.force[k] - entered[k]) - (quiet.force[k] - slow[k]);
-            (0..n).map(noise).collect()
-        });
+        let mut all = terms.iter();
+        if all.any(|(entry, _)| filters_reading(catalogue, *entry)) {
+            state.entered = Some(state.force.clone());
+        }
+        for stage in FILTERED_BEHIND_CONTACT {
+            run(stage, &mut state);
+        }
         run(Stage::Input, &mut state);
     }
     state
@@ -278,6 +270,33 @@ fn filters_reading(catalogue: &Catalogue, entry: usize) -> bool {
 
 /// Reach in s of the means twice over that leave out of the force what is fast in it: mostly the slip's noise.
 const FAST_S: f64 = 0.005;
+
+/// What a model's filters between contact and reading add to what is fast in the force that enters them, in N.
+pub fn added_to_fast<T: Listed>(
+    catalogue: &Catalogue,
+    model: &Model,
+    p: &[T],
+    series: &Series,
+    context: &Context,
+    entered: &[T],
+) -> Vec<T> {
+    // As many samples as lie within the reach, to the nearest.
+    let reach = FAST_S + 0.5 * series.typical_dt;
+    let slow = mean_twice_about(&series.time, entered, &series.tyre, reach);
+    let fast: Vec<T> = zip(entered, &slow)
+        .map(|(all, slow)| *all - *slow)
+        .collect();
+    let mut state = State::empty();
+    state.force = fast.clone();
+    for (entry, own) in split(model, p) {
+        if filters_reading(catalogue, entry) {
+            T::entry(catalogue, entry).apply(own, series, context, &mut state);
+        }
+    }
+    zip(state.force, fast)
+        .map(|(read, fast)| read - fast)
+        .collect()
+}
 
 /// Stages between the slip and the reading at which filters stand, in their order.
 const FILTERED_AT: [Stage; 5] = [

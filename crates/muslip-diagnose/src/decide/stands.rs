@@ -78,7 +78,7 @@ fn is_plausible(trial: &Trial) -> bool {
 /// read has to predict it clearly, however much it gains: of the six false ones on 416 campaigns behind chains that lack
 /// nothing one lowers the error by more than 0.16, of 18 true ones one by less than 0.43.
 fn least_predicted(trial: &Trial) -> f64 {
-    if trial.by_load_as_read {
+    if trial.like_noise_of_load {
         CLEARLY_PREDICTED
     } else if gains_beyond_chain(trial) || rings_out(trial) {
         -PREDICTED_APART
@@ -174,7 +174,8 @@ pub fn rivals(trial: &Trial) -> bool {
 /// Whether unseen runs gain, alike or not.
 fn gains_on_unseen_runs(trial: &Trial) -> bool {
     let (mean, t) = trial.unseen;
-    let speaks = mean > 0.0 && t > LEAST_T_OF_LIKELIER || largely_predicts(trial);
+    let alike = mean > 0.0 && t > LEAST_T_OF_LIKELIER;
+    let speaks = alike || rings_out(trial) || largely_predicts(trial);
     trial.gain > least_gain_of_name(trial) && speaks
 }
 
@@ -268,7 +269,7 @@ pub fn few_reach(trial: &Trial) -> bool {
 /// Whether what rings longer than any filter of a chain gains much at both levels of the noise, on more than one of several runs:
 /// those that hardly excite it are as many as not, and where its frequency is a little off they lose.
 fn rings_out(trial: &Trial) -> bool {
-    let least = LARGE_GAIN_OF_RING.max(LARGE_TO_WORTH * worth(trial)) * trial.share;
+    let least = (LARGE_GAIN_OF_RING * trial.share).max(LARGE_TO_WORTH * worth(trial));
     let of_runs = trial.unseen.0 * trial.runs as f64;
     let much = of_runs.min(trial.at_sensors.0) > least && trial.gain > least;
     let of_more_than_one = trial.without_best.iter().all(|gain| *gain > 0.0);
@@ -394,7 +395,7 @@ mod tests {
             without_best: [20.0, 10.0],
             ..of_name(&data, &base, Id::StructuralResonance, nats, 0.6)
         };
-        assert!(stands(&mode(120.0)) && few_reach(&mode(120.0)));
+        assert!(stands(&mode(120.0)) && few_reach(&mode(120.0)) && needed(&mode(120.0)));
         let refused = [
             mode(90.0),
             Trial {
@@ -424,7 +425,7 @@ mod tests {
         let base = toy::settled(&data);
         let stands_at = |predicts: f64, nats: f64, t: f64| {
             stands(&Trial {
-                by_load_as_read: true,
+                like_noise_of_load: true,
                 predicts,
                 first: true,
                 ..of_name(&data, &base, Id::LoadSensitivity, nats, t)

@@ -20,7 +20,7 @@ pub fn of_name(data: &Data, base: &Judged, id: Id, nats: f64, t: f64) -> Trial {
         own: true,
         says_as_well: None,
         fed_by_chain: false,
-        by_load_as_read: false,
+        like_noise_of_load: false,
         of_tyre: false,
         remembers: false,
         rings: false,

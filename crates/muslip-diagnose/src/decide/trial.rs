@@ -86,8 +86,8 @@ pub struct Trial {
     pub says_as_well: Option<Id>,
     /// Whether a measuring chain leaves what looks like it.
     pub fed_by_chain: bool,
-    /// Whether it goes by the load as read.
-    pub by_load_as_read: bool,
+    /// Whether what the load is read off by looks like it.
+    pub like_noise_of_load: bool,
     /// Whether it is the tyre's.
     pub of_tyre: bool,
     /// Whether it is a memory: what was before counts.
@@ -296,8 +296,8 @@ impl<'a> Before<'a> {
             }),
             // No chain feeds a memory of what was left to be explained because none shows.
             fed_by_chain: fed_by_chain == Some(true) && !of_left,
-            by_load_as_read: mechanism
-                .is_some_and(|(_, entry)| data.catalogue.get(entry).facts().by_load_as_read),
+            like_noise_of_load: mechanism
+                .is_some_and(|(_, entry)| data.catalogue.get(entry).facts().like_noise_of_load),
             of_tyre: mechanism
                 .is_some_and(|(_, entry)| data.catalogue.get(entry).guide().kind == Kind::Tyre),
             remembers: remembered.is_some(),

@@ -34,7 +34,8 @@ pub(super) struct NameOfForce {
     pub(super) remembers: bool,
     /// Whether it gains more than a measuring chain leaves.
     pub(super) beyond_chain: bool,
-    /// Whether so little speaks for it that a measuring chain's errors may have chosen it, where one shows or a speed is out of step.
+    /// Whether so little speaks for it that a measuring chain's errors may have chosen it, where one shows or a speed is surely out of
+    /// step.
     pub(super) weak: bool,
     /// Its confidence.
     pub(super) confidence: f64,

@@ -9,7 +9,7 @@ use core::iter::zip;
 
 use crate::data::{Catalogue, Data, Listed};
 use crate::mechanism::{Balance, Context, Stage, State};
-use crate::model::{Model, acting, tyre};
+use crate::model::{Model, acting, added_to_fast, tyre};
 use crate::number::Number;
 use crate::series::{Channel, Series};
 
@@ -178,7 +178,8 @@ fn rows_beside<T: Listed>(
     let acting = |stage: Stage| acting(catalogue, model, p, series, context, stage);
     let mut terms = model.terms.iter();
     let scaled = terms.any(|term| acts_on_speeds(catalogue, term.entry));
-    let force = Force::new(series, &state, scaled);
+    let added = added_by_load_cell(catalogue, model, p, series, context, &state);
+    let force = Force::new(series, &state, added, scaled);
     let wheel = match (&series.torque, series.wheel_balance.is_empty()) {
         (Some(torque), false) => {
             let acting = acting(Stage::Wheel);
@@ -207,27 +208,33 @@ struct Force<'a, T> {
 }
 
 /// What a model says that the load cell adds to the force in the contact, in N. What its filters take is made of the force
-/// smoothed to both sides: integrated, the noise of the slip stays in every level, times their delay, and none but the
+/// without what is fast in it: integrated, the slip's noise stays in every level, times their delay, and none but the
 /// shortest delays paid for that.
-fn added_by_load_cell<T: Number>(tyre: &State<T>, contact: &[T]) -> Vec<T> {
-    let both = zip(&tyre.force, contact);
+fn added_by_load_cell<T: Listed>(
+    catalogue: &Catalogue,
+    model: &Model,
+    p: &[T],
+    series: &Series,
+    context: &Context,
+    tyre: &State<T>,
+) -> Option<Vec<T>> {
+    let both = zip(&tyre.force, tyre.contact.as_ref()?);
     let mut added: Vec<T> = both.map(|(force, contact)| *force - *contact).collect();
-    if let Some(less) = &tyre.filtered_noise {
-        for (added, less) in added.iter_mut().zip(less) {
-            *added = *added - *less;
+    if let Some(entered) = &tyre.entered {
+        let fast = added_to_fast(catalogue, model, p, series, context, entered);
+        for (added, fast) in added.iter_mut().zip(fast) {
+            *added = *added - fast;
         }
     }
-    added
+    Some(added)
 }
 
 impl<'a, T: Number> Force<'a, T> {
-    fn new(series: &'a Series, tyre: &State<T>, scaled: bool) -> Self {
+    fn new(series: &'a Series, tyre: &State<T>, added: Option<Vec<T>>, scaled: bool) -> Self {
         let quiet = || {
             let by_model: Vec<f64> = tyre.force.iter().map(|f| f.value()).collect();
             calibrated_force(series, &by_model)
         };
-        let contact = tyre.contact.as_ref();
-        let added = contact.map(|contact| added_by_load_cell(tyre, contact));
         Self {
             series,
             added,
@@ -389,9 +396,12 @@ mod tests {
             let (p, series) = (model.vector(), &data.series[0]);
             let mut state = tyre::<f64>(&data.catalogue, &model, &p, series, &data.context);
             if !quiet {
-                state.filtered_noise = None;
+                state.entered = None;
             }
-            added_by_load_cell(&state, state.contact.as_ref().unwrap())
+            let Data {
+                catalogue, context, ..
+            } = data;
+            added_by_load_cell(catalogue, &model, &p, series, context, &state).unwrap()
         };
         let truth = added(&exact, false);
         let off = |own: &[f64]| rms(&data.series[0], |k| own[k] - truth[k]);

@@ -193,8 +193,8 @@ pub struct Facts {
     /// Whether a measuring chain leaves what looks like it: kernels that differ, slip's noise that flattens the curve, the
     /// pitch of a ring.
     pub fed_by_chain: bool,
-    /// Whether it goes by the load as read, whose errors are no force: it has to predict the drag clearly.
-    pub by_load_as_read: bool,
+    /// Whether what the load is read off by looks like it: it has to predict the drag clearly.
+    pub like_noise_of_load: bool,
     /// Whether it is another curve of friction over slip, as any free dependence along the slip is.
     pub another_curve: bool,
     /// Whether the noise has a part of each run that is like it, an offset of the slip or of the drag: only where runs are
@@ -225,7 +225,7 @@ impl Facts {
             rare: false,
             filters: false,
             fed_by_chain: false,
-            by_load_as_read: false,
+            like_noise_of_load: false,
             another_curve: false,
             like_noise_of_run: false,
         }

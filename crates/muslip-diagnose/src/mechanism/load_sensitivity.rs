@@ -20,7 +20,7 @@ impl Describe for LoadSensitivity {
         };
         Facts {
             form,
-            by_load_as_read: true,
+            like_noise_of_load: true,
             ..Facts::of(
                 Id::LoadSensitivity,
                 Stage::Law,

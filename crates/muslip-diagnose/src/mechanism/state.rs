@@ -84,8 +84,8 @@ pub struct State<T> {
     pub force: Vec<T>,
     /// Contact force as it was before the measuring chain (kept from stage `Contact`).
     pub contact: Option<Vec<T>>,
-    /// What the filters between contact and reading add to what is fast in the force, in N, where there are such.
-    pub filtered_noise: Option<Vec<T>>,
+    /// The force in N as it enters the filters between contact and reading, where there are such.
+    pub entered: Option<Vec<T>>,
     /// Relative change of inertia (wheel) or mass (vehicle).
     pub inertia_change: T,
     /// Relative error of the drag channel's scale.
@@ -116,7 +116,7 @@ impl<T: Number> State<T> {
             friction: Vec::new(),
             force: Vec::new(),
             contact: None,
-            filtered_noise: None,
+            entered: None,
             inertia_change: zero,
             gain_change: zero,
             opposing: Vec::new(),

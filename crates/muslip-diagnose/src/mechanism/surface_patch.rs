@@ -30,7 +30,8 @@ struct Stretch {
 fn spread(evidence: &[Residuals]) -> f64 {
     let squares = evidence.iter().flat_map(|e| {
         let weighed = e.residual.iter().zip(&e.weight);
-        weighed.filter(|(_, w)| **w > 0.0).map(|(r, w)| r * r * w)
+        let squares = weighed.map(|(r, w)| r * r * w);
+        squares.filter(|square| square.is_finite() && *square > 0.0)
     });
     let (sum, count) = squares.fold((0.0, 0.0), |(sum, count), x| (sum + x, count + 1.0));
     f64::sqrt(sum / f64::max(count, 1.0))
@@ -265,11 +266,13 @@ mod tests {
             7.262..7.813 => 0.15,
             _ => 0.0,
         };
-        let residuals = Residuals {
+        // Beside a sensor of 10 N, and one of 1 N, of which what is missing is twenty standard deviations.
+        let residuals = |weight: f64| Residuals {
             predicted: vec![100.0; distance.len()],
             residual: distance.iter().map(|x| 100.0 * change(*x)).collect(),
-            weight: vec![1e-2; distance.len()],
+            weight: vec![weight; distance.len()],
         };
+        let residuals = [1e-2, 1.0].map(residuals);
         let context = Context {
             distance: 10.0,
             ..Context::default()
@@ -280,11 +283,6 @@ mod tests {
             ..Series::default()
         };
         let two = SurfacePatch { patches: 2 };
-        let starts = two.starts(&Search {
-            context: &context,
-            series: &[series],
-            residuals: &[residuals],
-        });
         let fine = 10.0 / Scan::BINS as f64;
         let near = |a: f64, b: f64| (a - b).abs() < 1.5 * fine;
         let found = |s: &Vec<f64>| {
@@ -292,7 +290,15 @@ mod tests {
                 && near(s[0] + s[1], 4.171)
                 && near(s[3], 7.262)
                 && near(s[3] + s[4], 7.813)
+                && (s[2] + 0.8 * 0.2).abs() < 0.04
         };
-        assert!(starts.iter().any(found), "{starts:?}");
+        for residuals in residuals {
+            let starts = two.starts(&Search {
+                context: &context,
+                series: core::slice::from_ref(&series),
+                residuals: &[residuals],
+            });
+            assert!(starts.iter().any(found), "{starts:?}");
+        }
     }
 }

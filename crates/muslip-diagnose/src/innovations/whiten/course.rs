@@ -25,7 +25,7 @@ pub struct Course {
 pub struct Step {
     pub(super) row: [f64; MOST],
     pub(super) dt: f64,
-    /// Last part of it over which the reading is a mean of the walk, in s; nothing where it is a level of its own.
+    /// Over how much of the time before it, in s, the reading is a mean of the walk.
     pub(super) meant: f64,
     decay: u32,
     /// Whether nothing is known of the level before this reading.
@@ -99,6 +99,13 @@ fn row_of(parts: &[Part<'_>], filtered: Option<&Pair>, k: usize) -> [f64; MOST] 
     row
 }
 
+/// How long the reading at a sample was taken, in s: since the one before, or as long as until the next one.
+fn length(time: &[f64], segment: &core::ops::Range<usize>, k: usize) -> f64 {
+    let from = k.saturating_sub(1).max(segment.start);
+    let to = (from + 1).min(segment.end - 1);
+    time[to] - time[from]
+}
+
 impl Course {
     /// Every `stride`-th reading of a run. `segments` are the stretches in use; at most [`MOST`] parts.
     #[must_use]
@@ -150,11 +157,7 @@ impl Course {
                 out.steps.push(Step {
                     row: row_of(parts, out.filtered.as_ref(), k),
                     dt,
-                    meant: if walk && !fresh {
-                        f64::min(time[k] - time[k - 1], dt)
-                    } else {
-                        0.0
-                    },
+                    meant: if walk { length(time, segment, k) } else { 0.0 },
                     decay: decay as u32,
                     fresh,
                 });
