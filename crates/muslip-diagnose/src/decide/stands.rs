@@ -268,7 +268,8 @@ pub fn few_reach(trial: &Trial) -> bool {
 
 /// Whether what rings longer than any filter of a chain gains much at both levels of the noise, on more than one of several runs:
 /// those that hardly excite it are as many as not, and where its frequency is a little off they lose.
-fn rings_out(trial: &Trial) -> bool {
+#[must_use]
+pub fn rings_out(trial: &Trial) -> bool {
     let least = (LARGE_GAIN_OF_RING * trial.share).max(LARGE_TO_WORTH * worth(trial));
     let of_runs = trial.unseen.0 * trial.runs as f64;
     let much = of_runs.min(trial.at_sensors.0) > least && trial.gain > least;

@@ -90,10 +90,10 @@ pub struct Trial {
     pub like_noise_of_load: bool,
     /// Whether it is the tyre's.
     pub of_tyre: bool,
-    /// Whether it is a memory: what was before counts.
-    pub remembers: bool,
     /// Whether it rings, longer than any filter of a measuring chain.
     pub rings: bool,
+    /// Whether it is a memory: what was before counts.
+    pub remembers: bool,
     /// Whether that is as long as a recording can show.
     pub lasts: bool,
     /// Whether its memory is longer than what the chain's own timing was off by, and no longer than the channels show.

@@ -8,7 +8,7 @@ use crate::chain::recorded::Recorded;
 use crate::chain::timing::Timing;
 use crate::constants::WEAK_NATS;
 use crate::data::Data;
-use crate::decide::{Asked, Decision, Trial, could_stand, decide, gains_beyond_chain};
+use crate::decide::{Asked, Decision, Trial, could_stand, decide, gains_beyond_chain, rings_out};
 use crate::innovations::hypothesis::{Judged, whole_over_slow};
 use crate::innovations::noise::BalanceParts;
 use crate::mechanism::{Balance, Context, Id};
@@ -32,7 +32,7 @@ pub(super) struct NameOfForce {
     pub(super) id: Id,
     /// Whether it is a memory.
     pub(super) remembers: bool,
-    /// Whether it gains more than a measuring chain leaves.
+    /// Whether it gains more than a measuring chain leaves, or rings longer than its filters and gains much.
     pub(super) beyond_chain: bool,
     /// Whether so little speaks for it that a measuring chain's errors may have chosen it, where one shows or a speed is surely out of
     /// step.
@@ -162,7 +162,8 @@ impl<'a> Answer<'a> {
                     id: mechanism.id(),
                     remembers: self.remembers_force(term),
                     weak: chained && taken_up.is_none_or(|own| own.weight() < WEAK_NATS),
-                    beyond_chain: taken_up.is_some_and(gains_beyond_chain),
+                    beyond_chain: taken_up
+                        .is_some_and(|own| gains_beyond_chain(own) || rings_out(own)),
                     confidence: sure.as_ref().map_or(0.0, |own| own.confidence),
                     rivals: sure.map_or(Vec::new(), |own| own.rivals()),
                 }
