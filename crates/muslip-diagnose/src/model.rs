@@ -247,25 +247,18 @@ pub fn tyre<T: Listed>(
     {
         state.contact = Some(state.force.clone());
         run(Stage::Reading, &mut state);
-        let mut all = terms.iter();
-        if all.any(|(entry, _)| filters_reading(catalogue, *entry)) {
+        let filters = |(entry, _): &(usize, &[T])| {
+            let facts = catalogue.get(*entry).facts();
+            facts.filters && facts.stage > Stage::Contact
+        };
+        if terms.iter().any(filters) {
             state.entered = Some(state.force.clone());
         }
-        for stage in FILTERED_BEHIND_CONTACT {
+        for stage in [Stage::Structure, Stage::Filter, Stage::Line, Stage::Input] {
             run(stage, &mut state);
         }
-        run(Stage::Input, &mut state);
     }
     state
-}
-
-/// Stages between contact and reading at which filters stand, in their order.
-const FILTERED_BEHIND_CONTACT: [Stage; 3] = [Stage::Structure, Stage::Filter, Stage::Line];
-
-/// Whether a mechanism filters the force between contact and reading.
-fn filters_reading(catalogue: &Catalogue, entry: usize) -> bool {
-    let facts = catalogue.get(entry).facts();
-    facts.filters && FILTERED_BEHIND_CONTACT.contains(&facts.stage)
 }
 
 /// Reach in s of the means twice over that leave out of the force what is fast in it: mostly the slip's noise.
@@ -286,16 +279,16 @@ pub fn added_to_fast<T: Listed>(
     let fast: Vec<T> = zip(entered, &slow)
         .map(|(all, slow)| *all - *slow)
         .collect();
-    let mut state = State::empty();
-    state.force = fast.clone();
-    for (entry, own) in split(model, p) {
-        if filters_reading(catalogue, entry) {
-            T::entry(catalogue, entry).apply(own, series, context, &mut state);
-        }
-    }
-    zip(state.force, fast)
-        .map(|(read, fast)| read - fast)
-        .collect()
+    let read = filtered(
+        catalogue,
+        model,
+        p,
+        Stage::Structure,
+        series,
+        context,
+        fast.clone(),
+    );
+    zip(read, fast).map(|(read, fast)| read - fast).collect()
 }
 
 /// Stages between the slip and the reading at which filters stand, in their order.
@@ -315,24 +308,25 @@ pub fn is_filtered(catalogue: &Catalogue, model: &Model) -> bool {
 
 /// What a model's filters leave of a change of the force in N, as long as the series, where the reading is taken: those
 /// from a stage on. A change of the slip passes them, from its own stage on, as the change of the force that it makes.
-pub fn filtered(
+pub fn filtered<T: Listed>(
     catalogue: &Catalogue,
     model: &Model,
+    p: &[T],
     from: Stage,
     series: &Series,
     context: &Context,
-    mut change: Vec<f64>,
-) -> Vec<f64> {
+    mut change: Vec<T>,
+) -> Vec<T> {
+    let terms: Vec<(usize, &[T])> = split(model, p).collect();
     let mut state = State::empty();
     for stage in FILTERED_AT.into_iter().skip_while(|stage| *stage != from) {
-        for term in &model.terms {
-            let facts = catalogue.get(term.entry).facts();
+        for (entry, own) in &terms {
+            let facts = catalogue.get(*entry).facts();
             if !facts.filters || facts.stage != stage {
                 continue;
             }
             *passing(&mut state, stage) = change;
-            let mechanism = f64::entry(catalogue, term.entry);
-            mechanism.apply(&term.parameters, series, context, &mut state);
+            T::entry(catalogue, *entry).apply(own, series, context, &mut state);
             change = core::mem::take(passing(&mut state, stage));
         }
     }
@@ -340,7 +334,7 @@ pub fn filtered(
 }
 
 /// What passes a filter that stands at a stage.
-fn passing(state: &mut State<f64>, stage: Stage) -> &mut Vec<f64> {
+fn passing<T>(state: &mut State<T>, stage: Stage) -> &mut Vec<T> {
     if stage == Stage::Slip {
         &mut state.slip
     } else {
@@ -492,7 +486,15 @@ mod tests {
                 let Data {
                     catalogue, context, ..
                 } = &data;
-                filtered(catalogue, &model, Stage::Slip, series, context, x)
+                filtered(
+                    catalogue,
+                    &model,
+                    &model.vector(),
+                    Stage::Slip,
+                    series,
+                    context,
+                    x,
+                )
             };
             let both = core::iter::zip(&slow, &fast).map(|(s, f)| 3.0 * s - 2.0 * f);
             let both = passed(both.collect());

@@ -46,11 +46,6 @@ fn in_step(late: Late) -> bool {
     late.value.abs() < IN_STEP_S + 2.0 * late.std
 }
 
-/// Whether it is known well enough that a channel is later or earlier than the drag.
-fn heard_out_of_step(late: Late) -> bool {
-    late.std < HEARD_S && !in_step(late)
-}
-
 /// Least lateness in s, known so well, that is left to be explained: what loggers and filters are out of step by unseen; where
 /// none shows that there are such, what stands out of its own error.
 fn least_left_s(chain_shows: bool, std: f64) -> f64 {
@@ -214,9 +209,10 @@ impl Timing {
     /// Whether a speed is known to be in step with the drag, as it was left, and nothing that is heard is not.
     fn all_in_step(&self) -> bool {
         let speeds = [self.wheel, self.vehicle];
-        let known = speeds.iter().any(|late| late.std < VAGUE_S);
-        let all = [self.wheel, self.vehicle, self.brake];
-        known && !all.into_iter().any(heard_out_of_step)
+        let mut heard = [self.wheel, self.vehicle, self.brake]
+            .into_iter()
+            .filter(|late| late.std < HEARD_S);
+        speeds.iter().any(|late| late.std < VAGUE_S) && heard.all(in_step)
     }
 
     /// Whether a speed is surely out of step with the drag, as it was left.

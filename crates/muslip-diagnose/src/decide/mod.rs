@@ -21,7 +21,7 @@ use refuted::refuted;
 pub use round::Asked;
 use round::Question;
 use settled::{again, at_noise_of, settled, under_own_noise};
-pub use stands::{could_stand, few_reach, gains_beyond_chain, rings_out, rivals};
+pub use stands::{could_stand, few_reach, gains_beyond_chain, rivals};
 use stands::{needed, stands};
 use trial::Before;
 pub use trial::{Claim, Trial};

@@ -80,7 +80,7 @@ fn is_plausible(trial: &Trial) -> bool {
 fn least_predicted(trial: &Trial) -> f64 {
     if trial.like_noise_of_load {
         CLEARLY_PREDICTED
-    } else if gains_beyond_chain(trial) || rings_out(trial) {
+    } else if gains_beyond_chain(trial) {
         -PREDICTED_APART
     } else if several_name(trial, LEAST_T_OF_SURE) && trial.first && !trial.remembers {
         0.0
@@ -91,14 +91,15 @@ fn least_predicted(trial: &Trial) -> f64 {
     }
 }
 
-/// Whether unseen runs together gain more by a name that works through the force than a measuring chain leaves: of fewer
-/// recordings as much less.
+/// Whether unseen runs together gain more by a name that works through the force than a measuring chain leaves, of fewer
+/// recordings as much less; or much by what rings longer than any filter of a chain.
 #[must_use]
 pub fn gains_beyond_chain(trial: &Trial) -> bool {
     let of_runs = trial.unseen.0 * trial.runs as f64;
     let of_chain = LARGE_GAIN_ON_UNSEEN * trial.share;
     let least = of_chain.max(LARGE_TO_WORTH * worth(trial));
-    trial.mechanism().is_some() && trial.predicts.is_finite() && of_runs > least
+    let outgains = trial.mechanism().is_some() && trial.predicts.is_finite() && of_runs > least;
+    outgains || rings_out(trial)
 }
 
 /// Whether several unseen runs together gain much, and the drag is predicted better.
@@ -239,9 +240,9 @@ fn seen_on_unseen_runs(trial: &Trial) -> bool {
                 LEAST_T
             };
             let several = trial.runs >= FEWEST_RUNS_AGREED;
-            let of_few =
-                trial.unanimous[0] && (clearly || large && several) || several && undisputed(trial);
-            let of_few = of_few || rings_out(trial);
+            let of_few = trial.unanimous[0] && (clearly || large && several)
+                || several && undisputed(trial)
+                || rings_out(trial);
             mean > 0.0 && (t >= least || of_few) || largely_predicts(trial)
         }
         // What says nothing of what it is has to be seen at the sensors' noise as well: fitted noise may have left it.
@@ -268,8 +269,7 @@ pub fn few_reach(trial: &Trial) -> bool {
 
 /// Whether what rings longer than any filter of a chain gains much at both levels of the noise, on more than one of several runs:
 /// those that hardly excite it are as many as not, and where its frequency is a little off they lose.
-#[must_use]
-pub fn rings_out(trial: &Trial) -> bool {
+fn rings_out(trial: &Trial) -> bool {
     let least = (LARGE_GAIN_OF_RING * trial.share).max(LARGE_TO_WORTH * worth(trial));
     let of_runs = trial.unseen.0 * trial.runs as f64;
     let much = of_runs.min(trial.at_sensors.0) > least && trial.gain > least;

@@ -8,7 +8,7 @@ use crate::chain::recorded::Recorded;
 use crate::chain::timing::Timing;
 use crate::constants::WEAK_NATS;
 use crate::data::Data;
-use crate::decide::{Asked, Decision, Trial, could_stand, decide, gains_beyond_chain, rings_out};
+use crate::decide::{Asked, Decision, Trial, could_stand, decide, gains_beyond_chain};
 use crate::innovations::hypothesis::{Judged, whole_over_slow};
 use crate::innovations::noise::BalanceParts;
 use crate::mechanism::{Balance, Context, Id};
@@ -162,8 +162,7 @@ impl<'a> Answer<'a> {
                     id: mechanism.id(),
                     remembers: self.remembers_force(term),
                     weak: chained && taken_up.is_none_or(|own| own.weight() < WEAK_NATS),
-                    beyond_chain: taken_up
-                        .is_some_and(|own| gains_beyond_chain(own) || rings_out(own)),
+                    beyond_chain: taken_up.is_some_and(gains_beyond_chain),
                     confidence: sure.as_ref().map_or(0.0, |own| own.confidence),
                     rivals: sure.map_or(Vec::new(), |own| own.rivals()),
                 }

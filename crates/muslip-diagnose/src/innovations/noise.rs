@@ -105,7 +105,15 @@ impl Slopes {
                 catalogue, context, ..
             } = data;
             let of_run = |(s, change): (&Series, &Vec<f64>)| {
-                filtered(catalogue, model, Stage::Contact, s, context, change.clone())
+                filtered(
+                    catalogue,
+                    model,
+                    &p,
+                    Stage::Contact,
+                    s,
+                    context,
+                    change.clone(),
+                )
             };
             let read = |all: &[Vec<f64>]| data.series.par_iter().zip(all).map(of_run).collect();
             out.read = Some([read(&out.force), read(&out.slip)]);

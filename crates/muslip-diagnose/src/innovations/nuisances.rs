@@ -150,7 +150,8 @@ impl<'a> Chain<'a> {
         let Data {
             catalogue, context, ..
         } = self.data;
-        filtered(catalogue, self.model, from, s, context, known)
+        let p = self.model.vector();
+        filtered(catalogue, self.model, &p, from, s, context, known)
     }
 
     /// Where the wheel speed reads so much less.

@@ -26,6 +26,17 @@ pub struct Rows<T> {
     pub vehicle: Vec<T>,
 }
 
+impl<T: Number> Rows<T> {
+    /// That of the tyre alone, by the force that its model reads.
+    fn of_tyre(series: &Series, force: Vec<T>) -> Self {
+        Self {
+            tyre: tyre_row(series, force),
+            wheel: Vec::new(),
+            vehicle: Vec::new(),
+        }
+    }
+}
+
 impl<T> Rows<T> {
     /// Those of one balance.
     #[must_use]
@@ -141,11 +152,7 @@ pub fn moved_rows<T: Listed>(
     if moves_speeds(catalogue, model, &state) {
         return rows_beside(catalogue, model, p, series, context, state);
     }
-    Rows {
-        tyre: tyre_row(series, state.force),
-        wheel: Vec::new(),
-        vehicle: Vec::new(),
-    }
+    Rows::of_tyre(series, state.force)
 }
 
 /// Whether a mechanism acts on wheel or vehicle.
@@ -175,6 +182,9 @@ fn rows_beside<T: Listed>(
     context: &Context,
     state: State<T>,
 ) -> Rows<T> {
+    if series.wheel_balance.is_empty() && series.vehicle_balance.is_empty() {
+        return Rows::of_tyre(series, state.force);
+    }
     let acting = |stage: Stage| acting(catalogue, model, p, series, context, stage);
     let mut terms = model.terms.iter();
     let scaled = terms.any(|term| acts_on_speeds(catalogue, term.entry));
