@@ -249,8 +249,8 @@ fn read_in(stretch: &Stretch, piece: &[usize], order: f64) -> Option<[f64; 2]> {
     Some([solved[4], solved[5]]).filter(|own| own.iter().all(|x| x.is_finite()))
 }
 
-/// Whether so many shares are hardly any, in the middle: neither of one sign nor of the other.
-fn hardly_any(shares: &mut [f64]) -> bool {
+/// Whether so many shares are surely less than an encoder's, in the middle: neither of one sign nor of the other.
+fn lacks(shares: &mut [f64]) -> bool {
     let middle = median_in_place(shares);
     let mut apart: Vec<f64> = shares.iter().map(|x| (x - middle).abs()).collect();
     // Of a normal distribution the median deviation is 0.67 of the standard one; a median spreads by a quarter more than a
@@ -330,7 +330,7 @@ pub fn ripple_of_law(left: &[Stretch], step: f64) -> Option<OfLaw> {
         own.power() > f64::max(shown, TOLD_POWERS * 2.0 * variance / own.weight.max(1e-300))
     };
     let mut shares = shares_read(left, &parts, order as f64, shows);
-    let unread = shares.iter_mut().all(|own| hardly_any(own));
+    let unread = shares.iter_mut().all(|own| lacks(own));
     let said = || {
         Finding::of("wheel_speed_rad_s", Word::Ripple, (value, std), "1").saying(format!(
             "The wheel speed varies by {:.2} % {order} times a revolution.",
@@ -400,4 +400,22 @@ fn relative(run: &Recording) -> Vec<(Vec<f64>, Vec<f64>, f64)> {
         out.push((series, angles, middle / core::f64::consts::TAU));
     }
     out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_reading_lacks_a_ripple_where_it_surely_has_less_than_an_encoder_of_either_sign() {
+        // Evenly about the middle: the median deviation is half of the reach.
+        let lacks_at = |middle: f64, reach: f64, pieces: usize| {
+            let at = |k: usize| middle + reach * (2.0 * k as f64 / (pieces - 1) as f64 - 1.0);
+            lacks(&mut (0..pieces).map(at).collect::<Vec<_>>())
+        };
+        // 1.25 * 1.48 * 0.75 / 8 = 0.17: three of them are 0.52.
+        assert!(lacks_at(0.01, 1.5, 64) && lacks_at(-0.25, 1.5, 64));
+        assert!(!lacks_at(0.3, 1.5, 64) && !lacks_at(0.83, 0.1, 64));
+        assert!(!lacks_at(0.0, 0.1, FEWEST_TURNED - 1), "too few to tell");
+    }
 }
