@@ -402,12 +402,12 @@ pub fn wheel<T: Listed>(
         return vec![T::constant(0.0); n];
     };
     let state = acting(catalogue, model, p, series, context, Stage::Wheel);
-    let true_share = T::constant(1.0) / (state.gain_change + 1.0);
     let opposing = |k: usize| {
         // Deviations from the base model act on smoothed columns, so that a parameter cannot buy
         // anything by scaling noise.
         let chain = chain.map_or(0.0, |c| c[k]);
-        let drag = (true_share - 1.0) * (series.drag_smooth[k] - chain) + (series.drag[k] - chain);
+        let smooth = series.drag_smooth[k] - chain;
+        let drag = (state.true_share(smooth) - 1.0) * smooth + (series.drag[k] - chain);
         let brake = state.brake[k] + (torque.raw[k] - torque.smooth[k]);
         state.inertia_change * (context.inertia * series.wheel.rate[k]) - drag * context.radius
             + brake
@@ -430,11 +430,11 @@ pub fn vehicle<T: Listed>(
         return vec![T::constant(0.0); n];
     }
     let state = acting(catalogue, model, p, series, context, Stage::Vehicle);
-    let true_share = T::constant(1.0) / (state.gain_change + 1.0);
     let force = |k: usize| {
         let chain = chain.map_or(0.0, |c| c[k]);
+        let smooth = series.drag_smooth[k] - chain;
         state.inertia_change * (context.mass * series.speed.rate[k])
-            + (true_share - 1.0) * (series.drag_smooth[k] - chain)
+            + (state.true_share(smooth) - 1.0) * smooth
             + (series.drag[k] - chain)
             + state.opposing[k]
     };

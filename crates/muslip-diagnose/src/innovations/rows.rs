@@ -262,11 +262,11 @@ impl<'a, T: Number> Force<'a, T> {
         quiet.map_or(T::constant(0.0), |quiet| -self.added(k) + quiet[k])
     }
 
-    /// Where the reading's scale is wrong by this. Deviations from the base are made of what does not hold the
+    /// The drag, where the reading's scale is wrong. Deviations from the base are made of what does not hold the
     /// residual's own noise, or a parameter could buy noise by scaling it: the drag's by the model's reading, the
     /// speeds' by their slow part.
-    fn at(&self, gain: T, k: usize) -> T {
-        (T::constant(1.0) / (gain + 1.0) - 1.0) * self.quiet(k)
+    fn by(&self, acting: &State<T>, k: usize) -> T {
+        (acting.true_share(self.series.drag_smooth[k]) - 1.0) * self.quiet(k)
             + (-self.added(k) + self.series.drag[k])
     }
 }
@@ -283,7 +283,7 @@ fn wheel<T: Number>(
     let slowing = |k: usize| {
         let brake = acting.brake[k] + (torque.raw[k] - torque.smooth[k]);
         let rolling = tyre.rolling_moment.as_ref().map_or(zero, |r| r[k]);
-        brake + acting.opposing[k] + rolling - force.at(acting.gain_change, k) * context.radius
+        brake + acting.opposing[k] + rolling - force.by(acting, k) * context.radius
     };
     let whole = 1.0 + series.slow_wheel_lacks;
     let level = |k: usize| {
@@ -306,8 +306,9 @@ fn vehicle<T: Number>(
     // A mass in error scales what slows it: by the model's force, for the speed's own errors are in the level.
     let lighter = T::constant(1.0) / (acting.inertia_change + 1.0) - 1.0;
     let slowing = |k: usize| {
-        let own = force.quiet(k) / (acting.gain_change + 1.0) + acting.opposing[k];
-        force.at(acting.gain_change, k) + acting.opposing[k] + lighter * own
+        let true_share = acting.true_share(series.drag_smooth[k]);
+        let own = true_share * force.quiet(k) + acting.opposing[k];
+        force.by(acting, k) + acting.opposing[k] + lighter * own
     };
     let level = |k: usize| T::constant(context.mass * series.speed.raw[k]);
     integrated(series, slowing, level)

@@ -80,7 +80,6 @@ pub fn catalogue<T: Number>() -> Vec<Box<dyn Mechanism<T>>> {
         entry(rolling_resistance::RollingResistance { growing: true }),
         entry(surface_patch::SurfacePatch { patches: 1 }),
         entry(surface_patch::SurfacePatch { patches: 2 }),
-        entry(force_gain::ForceGain),
         entry(aero_drag::AeroDrag),
         entry(grade_or_drive::GradeOrDrive),
         entry(vehicle_inertia::VehicleInertia),
@@ -88,6 +87,7 @@ pub fn catalogue<T: Number>() -> Vec<Box<dyn Mechanism<T>>> {
         entry(brake_lag::BrakeLag),
         entry(wheel_inertia::WheelInertia),
     ];
+    all.extend(force_gain::FORMS.map(|form| entry(force_gain::ForceGain { form })));
     all.extend(
         structural_resonance::FORMS
             .map(|form| entry(structural_resonance::StructuralResonance { form })),

@@ -88,8 +88,10 @@ pub struct State<T> {
     pub entered: Option<Vec<T>>,
     /// Relative change of inertia (wheel) or mass (vehicle).
     pub inertia_change: T,
-    /// Relative error of the drag channel's scale.
+    /// Relative error of the drag channel's scale, at no force.
     pub gain_change: T,
+    /// By how much that error grows with the reading's size, 1/N.
+    pub gain_bend: T,
     /// Force on the vehicle (N) or torque on the wheel (N m) beside the base model's.
     pub opposing: Vec<T>,
     /// Brake torque in N m.
@@ -119,6 +121,7 @@ impl<T: Number> State<T> {
             entered: None,
             inertia_change: zero,
             gain_change: zero,
+            gain_bend: zero,
             opposing: Vec::new(),
             brake: Vec::new(),
             rolling_moment: None,
@@ -127,6 +130,11 @@ impl<T: Number> State<T> {
 }
 
 impl<T: Number> State<T> {
+    /// What of a reading of the drag in N is the drag, by the error of the channel's scale, which is as bent either way.
+    pub fn true_share(&self, reading: f64) -> T {
+        T::constant(1.0) / (self.gain_bend * reading.abs() + self.gain_change + 1.0)
+    }
+
     /// Multiplies the peak friction by a factor a sample.
     pub fn scale_friction(&mut self, factor: &[T]) {
         multiply(&mut self.peak_factor, factor);
