@@ -320,7 +320,8 @@ impl<'a> Coupling<'a> {
         let beside = if contact.vehicle_speed_m_s < SLOWEST_M_S {
             0.0
         } else {
-            self.contact_force() / (1.0 + wheel.gain_change) - base
+            let read = self.contact_force();
+            read * wheel.true_share(read) - base
         };
         let beside = if beside.is_finite() { beside } else { 0.0 };
         Held {

@@ -20,7 +20,7 @@ type Case = (
 );
 
 /// Mechanisms of wheel and vehicle.
-const DYNAMICS: [Case; 8] = [
+const DYNAMICS: [Case; 9] = [
     ("aero_drag", "", &[("coefficient", 1.1, "kg/m")]),
     ("grade_or_drive", "", &[("force", -600.0, "N")]),
     ("vehicle_inertia", "", &[("mass_error", 0.2, "1")]),
@@ -33,6 +33,11 @@ const DYNAMICS: [Case; 8] = [
     ),
     ("brake_lag", "", &[("time_constant", 0.03, "s")]),
     ("force_gain", "", &[("gain_error", 0.1, "1")]),
+    (
+        "force_gain",
+        "bent",
+        &[("gain_error", 0.1, "1"), ("bend", 0.04, "1")],
+    ),
 ];
 
 /// The base law and one mechanism of wheel or vehicle.

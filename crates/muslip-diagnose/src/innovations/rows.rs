@@ -262,12 +262,16 @@ impl<'a, T: Number> Force<'a, T> {
         quiet.map_or(T::constant(0.0), |quiet| -self.added(k) + quiet[k])
     }
 
+    /// What of the reading is the drag, where its scale is wrong.
+    fn true_share(&self, acting: &State<T>, k: usize) -> T {
+        acting.true_share(self.quiet(k).value())
+    }
+
     /// The drag, where the reading's scale is wrong. Deviations from the base are made of what does not hold the
     /// residual's own noise, or a parameter could buy noise by scaling it: the drag's by the model's reading, the
     /// speeds' by their slow part.
-    fn by(&self, acting: &State<T>, k: usize) -> T {
-        (acting.true_share(self.series.drag_smooth[k]) - 1.0) * self.quiet(k)
-            + (-self.added(k) + self.series.drag[k])
+    fn drag(&self, acting: &State<T>, k: usize) -> T {
+        (self.true_share(acting, k) - 1.0) * self.quiet(k) + (-self.added(k) + self.series.drag[k])
     }
 }
 
@@ -283,7 +287,7 @@ fn wheel<T: Number>(
     let slowing = |k: usize| {
         let brake = acting.brake[k] + (torque.raw[k] - torque.smooth[k]);
         let rolling = tyre.rolling_moment.as_ref().map_or(zero, |r| r[k]);
-        brake + acting.opposing[k] + rolling - force.by(acting, k) * context.radius
+        brake + acting.opposing[k] + rolling - force.drag(acting, k) * context.radius
     };
     let whole = 1.0 + series.slow_wheel_lacks;
     let level = |k: usize| {
@@ -306,9 +310,8 @@ fn vehicle<T: Number>(
     // A mass in error scales what slows it: by the model's force, for the speed's own errors are in the level.
     let lighter = T::constant(1.0) / (acting.inertia_change + 1.0) - 1.0;
     let slowing = |k: usize| {
-        let true_share = acting.true_share(series.drag_smooth[k]);
-        let own = true_share * force.quiet(k) + acting.opposing[k];
-        force.by(acting, k) + acting.opposing[k] + lighter * own
+        let own = force.true_share(acting, k) * force.quiet(k) + acting.opposing[k];
+        force.drag(acting, k) + acting.opposing[k] + lighter * own
     };
     let level = |k: usize| T::constant(context.mass * series.speed.raw[k]);
     integrated(series, slowing, level)
@@ -341,6 +344,7 @@ mod tests {
     use crate::innovations::hypothesis::{Guess, judge};
     use crate::innovations::toy::{EFFORT, Noise, settled, stop, with_term};
     use crate::mechanism::Id;
+    use crate::number::mean_and_std;
 
     /// Root mean square over the stretches of the wheel's balance.
     fn rms(series: &Series, x: impl Fn(usize) -> f64) -> f64 {
@@ -397,6 +401,34 @@ mod tests {
         let judged = judge(&data, &model, &[], Guess::None, EFFORT).unwrap();
         let gain = 1.0 + judged.model.terms[0].parameters[0];
         assert!((gain - 1.2).abs() < 0.02, "{gain}");
+    }
+
+    #[test]
+    fn a_scale_that_bends_is_told_and_one_that_does_not_is_straight() {
+        let bend_found = |bend: f64, seed: u64| {
+            let mut data = stop(Noise::TYPICAL, seed);
+            let largest = data.context.max_drag;
+            for series in &mut data.series {
+                for reading in [&mut series.drag, &mut series.drag_smooth] {
+                    for force in reading {
+                        *force *= (1.2 - 0.5 * bend) / (1.0 - bend * force.abs() / largest);
+                    }
+                }
+            }
+            let law = settled(&data);
+            let mut model = with_term(&data, &law, Id::ForceGain, 0.0);
+            let mut forms = data.catalogue.entries().iter();
+            let bent = forms.position(|own| own.id() == Id::ForceGain && own.form() == "bent");
+            model.terms[0].entry = bent.unwrap();
+            model.terms[0].parameters = vec![0.0; 2];
+            let judged = judge(&data, &model, &[], Guess::None, EFFORT).unwrap();
+            judged.model.terms[0].parameters[1]
+        };
+        for bend in [0.0, 0.1] {
+            let off = |seed: u64| bend_found(bend, seed) - bend;
+            let (mean, std) = mean_and_std(&(4..10).map(off).collect::<Vec<_>>());
+            assert!(mean.abs() < 0.012 && std < 0.008, "{bend}: {mean} {std}");
+        }
     }
 
     #[test]

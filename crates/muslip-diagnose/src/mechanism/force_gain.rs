@@ -30,7 +30,7 @@ impl Describe for ForceGain {
             Form::Constant => ("", "reading = gain * drag"),
             Form::Bent => (
                 "bent",
-                "reading = drag (gain + bend (reading / largest reading - 1/2))",
+                "reading = drag (gain + bend (|reading| / largest reading - 1/2))",
             ),
         };
         Facts {
@@ -44,21 +44,25 @@ impl Describe for ForceGain {
         let gain = Parameter::new("gain_error", "1", -0.6, 1.5);
         match self.form {
             Form::Constant => vec![gain],
-            Form::Bent => vec![gain, Parameter::new("bend", "1", -0.5, 0.5)],
+            Form::Bent => vec![gain, Parameter::new("bend", "1", -0.2, 0.2)],
         }
     }
     fn owns(&self, p: &[f64], _context: &Context) -> bool {
         self.form == Form::Constant || p[1].abs() < MOST_BENT * p[0].abs()
     }
-    fn statement(&self, reported: &[Reported<f64>], _p: &[f64]) -> String {
-        format!(
-            "the drag channel reads {:.3} times the true drag",
-            reported[0].value
-        )
+    fn statement(&self, reported: &[Reported<f64>], p: &[f64]) -> String {
+        let by = reported[0].value;
+        match self.form {
+            Form::Constant => format!("the drag channel reads {by:.3} times the true drag"),
+            Form::Bent => format!(
+                "the drag channel reads {by:.3} times the true drag at half of its largest reading, {:.3} times at that",
+                by + 0.5 * p[1]
+            ),
+        }
     }
     fn guide(&self) -> Guide {
         Guide {
-            physics: "The drag channel's calibration is wrong by a factor. The tyre balance cannot see it, for peak friction takes it up; mass times deceleration, and the brake's torque, do.",
+            physics: "The drag channel's calibration is wrong by a factor, which may change a little with the force. The tyre balance hardly sees it, for peak friction takes it up; mass times deceleration, and the brake's torque, do.",
             kind: Kind::LoadCell,
             touches: &[Balance::Wheel, Balance::Vehicle],
             memory: Memory::None,
@@ -101,7 +105,7 @@ impl<T: Number> Mechanism<T> for ForceGain {
         state.gain_change += p[0];
         if self.form == Form::Bent {
             state.gain_change += p[1] * -0.5;
-            state.gain_bend += p[1] * context.max_drag.recip();
+            state.gain_bend += p[1] * context.max_drag.max(1e-9).recip();
         }
     }
     fn report(&self, p: &[T], _fitted: &Fitted<'_, T>) -> Vec<Reported<T>> {

