@@ -49,7 +49,7 @@ pub struct Context {
     pub slip_sigma: f64,
     /// Largest drag reading (99.9th percentile) in N.
     pub max_drag: f64,
-    /// Whether the drag varies once a revolution as a ripple of the wheel speed would have it, and its reading hardly does.
+    /// Whether the drag varies once a revolution as a ripple of the wheel speed would have it, and its reading less.
     #[serde(skip)]
     pub ripple_unread: bool,
     /// Factor by which the smoothing windows are widened.

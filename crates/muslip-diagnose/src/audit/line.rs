@@ -206,13 +206,13 @@ const MOST_OF_PIECE: f64 = 0.8;
 const TOLD_POWERS: f64 = 8.0;
 
 /// By how much of a ripple that the law's slip shows the wheel speed itself varies, in pieces of a few turns of the stretches
-/// that show it: in phase, and a quarter of a turn later.
+/// that show it, each with its weight: in phase, and a quarter of a turn later.
 fn shares_read(
     left: &[Stretch],
     of_law: &[Amplitude],
     order: f64,
     shows: impl Fn(&Amplitude) -> bool,
-) -> [Vec<f64>; 2] {
+) -> [Vec<(f64, f64)>; 2] {
     let mut shares = [Vec::new(), Vec::new()];
     for (stretch, own) in left.iter().zip(of_law).filter(|(_, own)| shows(own)) {
         let turn = |k: &usize| (stretch.angle[*k] / (TAU * TURNS)) as i64;
@@ -222,20 +222,23 @@ fn shares_read(
             if piece.len() < FEWEST_READINGS || turned < MOST_OF_PIECE * TAU * TURNS {
                 continue;
             }
-            if let Some([cos, sin]) = read_in(stretch, piece, order) {
-                shares[0].push((own.cos * cos + own.sin * sin) / own.power());
-                shares[1].push((own.cos * sin - own.sin * cos) / own.power());
+            if let Some(Amplitude { cos, sin, weight }) = read_in(stretch, piece, order) {
+                let weight = weight * own.power();
+                shares[0].push(((own.cos * cos + own.sin * sin) / own.power(), weight));
+                shares[1].push(((own.cos * sin - own.sin * cos) / own.power(), weight));
             }
         }
     }
     shares
 }
 
-/// Cosine and sine of the wheel speed's relative ripple in a piece of a stretch, beside a cubic and under a window.
-fn read_in(stretch: &Stretch, piece: &[usize], order: f64) -> Option<[f64; 2]> {
+/// The wheel speed's relative ripple in a piece of a stretch, beside a cubic and under a window: it weighs by what is left there
+/// beside both, for where the slip changes that is much.
+fn read_in(stretch: &Stretch, piece: &[usize], order: f64) -> Option<Amplitude> {
     const WIDTH: usize = 6;
     let mut products = SMatrix::<f64, WIDTH, WIDTH>::zeros();
     let mut right = SVector::<f64, WIDTH>::zeros();
+    let (mut squares, mut whole) = (0.0, 0.0);
     for (i, &k) in piece.iter().enumerate() {
         let at = (i as f64 + 0.5) / piece.len() as f64;
         let x = 2.0 * at - 1.0;
@@ -243,27 +246,46 @@ fn read_in(stretch: &Stretch, piece: &[usize], order: f64) -> Option<[f64; 2]> {
         let row = SVector::from([1.0, x, x * x, x * x * x, cos, sin]);
         let weight = (core::f64::consts::PI * at).sin().powi(4);
         products += weight * row * row.transpose();
-        right += weight * stretch.omega[k].max(1e-3).ln() * row;
+        let reading = stretch.omega[k].max(1e-3).ln();
+        right += weight * reading * row;
+        squares += weight * reading * reading;
+        whole += weight;
     }
     let solved = products.cholesky()?.solve(&right);
-    Some([solved[4], solved[5]]).filter(|own| own.iter().all(|x| x.is_finite()))
+    let left = (squares - solved.dot(&right)).max(1e-12 * squares) / whole;
+    let own = Amplitude {
+        cos: solved[4],
+        sin: solved[5],
+        weight: piece.len() as f64 / left,
+    };
+    let finite = [own.cos, own.sin, own.weight].iter().all(|x| x.is_finite());
+    finite.then_some(own)
 }
 
-/// Whether so many shares are surely less than an encoder's, in the middle: neither of one sign nor of the other.
-fn lacks(shares: &mut [f64]) -> bool {
-    let middle = median_in_place(shares);
-    let mut apart: Vec<f64> = shares.iter().map(|x| (x - middle).abs()).collect();
-    // Of a normal distribution the median deviation is 0.67 of the standard one; a median spreads by a quarter more than a
-    // mean.
-    let std = 1.25 * 1.48 * median_in_place(&mut apart) / (shares.len() as f64).sqrt();
-    shares.len() >= FEWEST_TURNED && middle.abs() + TOLD_SIGMAS * std < READ_SHARE
+/// Whether so many shares, each with its weight, are surely less than an encoder's on the mean: neither of one sign nor of the
+/// other.
+fn lacks(shares: &[(f64, f64)]) -> bool {
+    let sum = |of: &dyn Fn(f64) -> f64| {
+        shares
+            .iter()
+            .map(|(x, weight)| weight * of(*x))
+            .sum::<f64>()
+    };
+    let whole = sum(&|_| 1.0);
+    let mean = sum(&|x| x) / whole;
+    // By how they scatter, for what is left in a piece is no white noise.
+    let scatter = shares
+        .iter()
+        .map(|(x, weight)| (weight * (x - mean)).powi(2));
+    let std = scatter.sum::<f64>().sqrt() / whole;
+    shares.len() >= FEWEST_TURNED && mean.abs() + TOLD_SIGMAS * std < READ_SHARE
 }
 
 /// What the law's slip shows of a ripple.
 pub struct OfLaw {
-    /// Ripple of the wheel speed; nothing where its reading hardly varies so.
+    /// Ripple of the wheel speed; nothing where its reading varies by less.
     pub ripple: Option<Finding>,
-    /// Whether it is one once a revolution that the reading hardly has.
+    /// Whether it is one once a revolution that the reading has less of.
     pub unread: bool,
 }
 
@@ -329,8 +351,8 @@ pub fn ripple_of_law(left: &[Stretch], step: f64) -> Option<OfLaw> {
     let shows = |own: &Amplitude| {
         own.power() > f64::max(shown, TOLD_POWERS * 2.0 * variance / own.weight.max(1e-300))
     };
-    let mut shares = shares_read(left, &parts, order as f64, shows);
-    let unread = shares.iter_mut().all(|own| lacks(own));
+    let shares = shares_read(left, &parts, order as f64, shows);
+    let unread = shares.iter().all(|own| lacks(own));
     let said = || {
         Finding::of("wheel_speed_rad_s", Word::Ripple, (value, std), "1").saying(format!(
             "The wheel speed varies by {:.2} % {order} times a revolution.",
@@ -407,15 +429,48 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_reading_lacks_a_ripple_where_it_surely_has_less_than_an_encoder_of_either_sign() {
-        // Evenly about the middle: the median deviation is half of the reach.
-        let lacks_at = |middle: f64, reach: f64, pieces: usize| {
-            let at = |k: usize| middle + reach * (2.0 * k as f64 / (pieces - 1) as f64 - 1.0);
-            lacks(&mut (0..pieces).map(at).collect::<Vec<_>>())
+    fn a_reading_lacks_a_ripple_where_it_surely_has_less_than_half_of_it_of_either_sign() {
+        // Half of the pieces read so much more than the mean, the others so much less.
+        let lacks_at = |mean: f64, off: f64, pieces: usize| {
+            let share = |k: usize| {
+                (
+                    if k.is_multiple_of(2) {
+                        mean + off
+                    } else {
+                        mean - off
+                    },
+                    7.0,
+                )
+            };
+            lacks(&(0..pieces).map(share).collect::<Vec<_>>())
         };
-        // 1.25 * 1.48 * 0.75 / 8 = 0.17: three of them are 0.52.
-        assert!(lacks_at(0.01, 1.5, 64) && lacks_at(-0.25, 1.5, 64));
-        assert!(!lacks_at(0.3, 1.5, 64) && !lacks_at(0.83, 0.1, 64));
+        // Of 64 pieces the mean is known to an eighth of what they are off by.
+        assert!(lacks_at(0.1, 1.0, 64) && lacks_at(-0.1, 1.0, 64));
+        assert!(!lacks_at(0.2, 1.0, 64) && !lacks_at(0.9, 0.1, 64) && !lacks_at(-0.9, 0.1, 64));
         assert!(!lacks_at(0.0, 0.1, FEWEST_TURNED - 1), "too few to tell");
+    }
+
+    #[test]
+    fn a_piece_in_which_the_slip_changes_weighs_little() {
+        // A tenth as much noise weighs a hundred times as much.
+        let weight = |noise: f64| {
+            let angle: Vec<f64> = (0..300).map(|k| 0.0628 * f64::from(k)).collect();
+            let jitter = |k: usize| if k.is_multiple_of(2) { noise } else { -noise };
+            let read = |(k, at): (usize, &f64)| 60.0 * (1.0 + 0.01 * at.cos() + jitter(k));
+            let stretch = Stretch {
+                omega: angle.iter().enumerate().map(read).collect(),
+                angle,
+                ..Stretch::default()
+            };
+            let all: Vec<usize> = (0..300).collect();
+            let own = read_in(&stretch, &all, 1.0).unwrap();
+            assert!(
+                (own.cos - 0.01).abs() < 2e-3 && own.sin.abs() < 2e-3,
+                "{own:?}"
+            );
+            own.weight
+        };
+        let ratio = weight(0.001) / weight(0.01);
+        assert!((ratio / 100.0 - 1.0).abs() < 0.3, "{ratio}");
     }
 }

@@ -67,7 +67,7 @@ pub struct Audit {
     pub timings: Timings,
     /// Slow noise of the vehicle speed.
     pub vehicle_colour: Option<Colour>,
-    /// Whether the drag varies once a revolution as a ripple of the wheel speed would have it, and its reading hardly does.
+    /// Whether the drag varies once a revolution as a ripple of the wheel speed would have it, and its reading less.
     pub ripple_unread: bool,
     /// A ring of the drag.
     pub ring: Option<Ring>,
@@ -170,7 +170,7 @@ const DRAG_STEP_S: f64 = 0.005;
 /// Step of the grid for ripple, s: a few of it a tooth of a commutator.
 const RIPPLE_STEP_S: f64 = 0.002;
 
-/// What shows beside the tyre's law: ripple, zero, slow noise of the drag; and whether the wheel speed's reading hardly has that
+/// What shows beside the tyre's law: ripple, zero, slow noise of the drag; and whether the wheel speed's reading has less of that
 /// ripple.
 fn of_tyre(
     rig: &Rig,

@@ -21,7 +21,7 @@ pub fn rank(data: &Data, trials: &mut [Trial]) {
     });
     commoner_first(trials, Trial::weight, |t| {
         let mechanism = t.mechanism();
-        mechanism.is_some_and(|(_, entry)| data.catalogue.get(entry).facts().rare)
+        mechanism.is_some_and(|(_, entry)| data.catalogue.get(entry).is_rare(&data.context))
     });
 }
 

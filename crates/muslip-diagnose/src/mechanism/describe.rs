@@ -186,8 +186,6 @@ pub struct Facts {
     /// Whether this form is of what the mechanism is mistaken for, and never named: where it says clearly more, the mechanism
     /// is refuted.
     pub counter_form: bool,
-    /// Whether it is rare beside what recordings hardly tell it from.
-    pub rare: bool,
     /// Whether it is a filter: linear in the force, or the slip, that passes it, and adds nothing of its own.
     pub filters: bool,
     /// Whether a measuring chain leaves what looks like it: kernels that differ, slip's noise that flattens the curve, the
@@ -222,7 +220,6 @@ impl Facts {
             amplitude: Some(0),
             counter_form: false,
             scales_level: false,
-            rare: false,
             filters: false,
             fed_by_chain: false,
             like_noise_of_load: false,
@@ -308,6 +305,10 @@ pub trait Describe: Send + Sync {
     /// Parameters that no figure tells and are nothing at zero: by what it varies about the figure, which is its mean.
     fn by_no_figure(&self) -> &'static [usize] {
         &[]
+    }
+    /// Whether it is rare beside what these recordings hardly tell it from.
+    fn is_rare(&self, _context: &Context) -> bool {
+        false
     }
     /// Another mechanism, rare beside it, that nothing in these recordings tells from it.
     fn rare_double(&self, _series: &[Series], _context: &Context) -> Option<Id> {

@@ -37,6 +37,10 @@ impl Describe for EncoderRipple {
         }
         self.form.starts(search.context)
     }
+    fn is_rare(&self, context: &Context) -> bool {
+        // Only a control that holds the reading takes its ripple out.
+        context.ripple_unread
+    }
     fn rare_double(&self, series: &[Series], context: &Context) -> Option<Id> {
         (Varies::of(series, context) == Varies::Encoder).then_some(Id::RunOut)
     }

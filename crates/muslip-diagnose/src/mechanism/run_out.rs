@@ -84,7 +84,6 @@ impl Describe for RunOut {
         };
         Facts {
             form: self.of.word(self.form),
-            rare: self.of == Of::Radius,
             fed_by_chain: true,
             ..Facts::of(Id::RunOut, stage, equation)
         }
@@ -103,6 +102,9 @@ impl Describe for RunOut {
             return Vec::new();
         }
         self.form.starts(search.context)
+    }
+    fn is_rare(&self, context: &Context) -> bool {
+        self.of == Of::Radius && !context.ripple_unread
     }
     fn rare_double(&self, series: &[Series], context: &Context) -> Option<Id> {
         // A control that holds what a rippling encoder reads makes the wheel turn unevenly instead.
