@@ -136,6 +136,9 @@ pub const FEW_RUNS_SURE: f64 = 0.9;
 pub const TIED: f64 = 0.99;
 /// Share of a name's likelihood from which another is hardly less likely: one softness apart, that is 1/e.
 pub const HARDLY_LESS: f64 = 0.37;
+/// Share of a name's likelihood from which another has a fair chance: the name is the less sure by it, and that it comes out of fewer
+/// recordings contradicts nothing.
+pub const FAIR_CHANCE: f64 = 0.2;
 /// Likelihood of what is rare as a share of that of what is common and looks the same.
 pub const RARE_SHARE: f64 = 0.05;
 /// Logarithm of the mean square error by which a prediction is clearly better, or worse.

@@ -10,6 +10,7 @@ use crate::constants::{
     LEAST_T_AT_SENSORS_NOT_FED, LEAST_T_NOT_FED, LEAST_T_OF_AGREED, LEAST_T_OF_DEPENDENCE,
     LEAST_T_OF_DEPENDENCE_AT_SENSORS, LEAST_T_OF_LARGE, LEAST_T_OF_LIKELIER, LEAST_T_OF_PREDICTED,
     LEAST_T_OF_SURE, LINED_UP_PREDICTED, LINED_UP_PREDICTED_BY_DEPENDENCE, PREDICTED_APART,
+    WEAK_NATS,
 };
 
 impl Trial {
@@ -31,6 +32,13 @@ impl Trial {
     #[must_use]
     pub fn weight(&self) -> f64 {
         (self.gain_that_counts() * self.at_sensors.0.max(0.0)).sqrt()
+    }
+
+    /// Whether so little speaks for it that the errors of the runs may have chosen it, and it does not take much of the drag's
+    /// error either.
+    #[must_use]
+    pub fn is_weak(&self) -> bool {
+        self.weight() < WEAK_NATS && !lowers_drag_s_error(self.predicts, LARGELY_PREDICTED)
     }
 
     /// What all unseen runs gain by it in nats, at the noise at which it stands: as fitted, or at the sensors' where the
@@ -239,11 +247,7 @@ fn seen_on_unseen_runs(trial: &Trial) -> bool {
             } else {
                 LEAST_T
             };
-            let several = trial.runs >= FEWEST_RUNS_AGREED;
-            let of_few = trial.unanimous[0] && (clearly || large && several)
-                || several && undisputed(trial)
-                || rings_out(trial);
-            mean > 0.0 && (t >= least || of_few) || largely_predicts(trial)
+            mean > 0.0 && (t >= least || few_show(trial)) || largely_predicts(trial)
         }
         // What says nothing of what it is has to be seen at the sensors' noise as well: fitted noise may have left it.
         Claim::Dependence(_) => {
@@ -264,7 +268,16 @@ fn lined_up(trial: &Trial) -> bool {
 pub fn few_reach(trial: &Trial) -> bool {
     let several = trial.runs >= FEWEST_RUNS_AGREED;
     let of_several = several && !trial.fed_by_chain && lined_up(trial);
-    undisputed(trial) || of_several || rings_out(trial) || largely_predicts(trial)
+    undisputed(trial) || few_show(trial) || of_several || largely_predicts(trial)
+}
+
+/// Whether few runs that gain are enough for a name: hardly any speaks against it, and it predicts clearly or gains more than a
+/// chain leaves; or it is undisputed, or rings.
+fn few_show(trial: &Trial) -> bool {
+    let several = trial.runs >= FEWEST_RUNS_AGREED;
+    let clearly = lowers_drag_s_error(trial.predicts, CLEARLY_PREDICTED);
+    let of_few = trial.unanimous[0] && (clearly || several && gains_beyond_chain(trial));
+    of_few || several && undisputed(trial) || rings_out(trial)
 }
 
 /// Whether what rings longer than any filter of a chain gains much at both levels of the noise, on more than one of several runs:
@@ -618,6 +631,37 @@ mod tests {
         };
         let refused = [fed, memory, of_three, disputed];
         assert!(refused.iter().all(|trial| !stands(trial)));
+    }
+
+    #[test]
+    fn what_takes_two_fifths_of_the_drag_s_error_is_not_weak_however_little_it_gains() {
+        let data = stop(Noise::TYPICAL, 4);
+        let base = toy::settled(&data);
+        let radius = |nats: f64, predicts: f64| Trial {
+            at_sensors: (nats, 3.0),
+            predicts,
+            ..of_name(&data, &base, Id::EffectiveRadius, nats, 3.0)
+        };
+        assert!(radius(15.0, 0.4).is_weak() && !radius(17.0, 0.4).is_weak());
+        assert!(!radius(11.0, 0.58).is_weak());
+        // An inertia predicts no drag.
+        assert!(radius(11.0, f64::INFINITY).is_weak());
+    }
+
+    #[test]
+    fn what_stands_by_few_runs_is_as_sure_as_they_are_even() {
+        let data = stop(Noise::TYPICAL, 4);
+        let base = toy::settled(&data);
+        let mode = |nats: f64, undisputed: bool| Trial {
+            fed_by_chain: true,
+            readings: 2000,
+            predicts: 0.0,
+            unanimous: [undisputed, false],
+            ..of_name(&data, &base, Id::StructuralResonance, nats, 1.2)
+        };
+        // Six runs of 60 nats are more than a chain leaves.
+        assert!(stands(&mode(60.0, true)) && few_reach(&mode(60.0, true)));
+        assert!(!few_reach(&mode(60.0, false)) && !few_reach(&mode(20.0, true)));
     }
 
     #[test]

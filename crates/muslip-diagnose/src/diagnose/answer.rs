@@ -6,7 +6,7 @@ use crate::audit::Audit;
 use crate::campaign::{Rig, Run};
 use crate::chain::recorded::Recorded;
 use crate::chain::timing::Timing;
-use crate::constants::WEAK_NATS;
+use crate::constants::{FAIR_CHANCE, HARDLY_LESS};
 use crate::data::Data;
 use crate::decide::{Asked, Decision, Trial, could_stand, decide, gains_beyond_chain};
 use crate::innovations::hypothesis::{Judged, whole_over_slow};
@@ -41,6 +41,8 @@ pub(super) struct NameOfForce {
     pub(super) confidence: f64,
     /// What its round holds for hardly less likely.
     pub(super) rivals: Vec<Id>,
+    /// What it gives a fair chance.
+    pub(super) chances: Vec<Id>,
 }
 
 /// Why a name is not said.
@@ -161,10 +163,13 @@ impl<'a> Answer<'a> {
                 NameOfForce {
                     id: mechanism.id(),
                     remembers: self.remembers_force(term),
-                    weak: chained && taken_up.is_none_or(|own| own.weight() < WEAK_NATS),
+                    weak: chained && taken_up.is_none_or(Trial::is_weak),
                     beyond_chain: taken_up.is_some_and(gains_beyond_chain),
                     confidence: sure.as_ref().map_or(0.0, |own| own.confidence),
-                    rivals: sure.map_or(Vec::new(), |own| own.rivals()),
+                    rivals: sure
+                        .as_ref()
+                        .map_or(Vec::new(), |own| own.likely(HARDLY_LESS)),
+                    chances: sure.map_or(Vec::new(), |own| own.likely(FAIR_CHANCE)),
                 }
             })
             .collect()

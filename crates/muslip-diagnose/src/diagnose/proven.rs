@@ -218,18 +218,20 @@ fn with_named(audit: &Audit, named: &[NamedMechanism], catalogue: &Catalogue) ->
 /// Names that the same argument without what is kept speaks against: a memory where it knows of none at all, or names one
 /// with which it predicts what is kept worse than without, for the chain's own kernels do much of what a memory does, but where
 /// it gains more than a chain leaves; any other
-/// where it does not come to that, nor to what is hardly likelier than that, but to another in its place that is no memory, or
-/// where little speaks for it. What all recordings together make sure is not refuted by fewer.
+/// where it does not come to that, nor to what is hardly likelier than that, but to another in its place that is no memory and has no
+/// fair chance by all recordings, or where little speaks for it. What all recordings together make sure is not refuted by fewer.
 fn refuted(named: &[NameOfForce], again: &Again) -> Vec<Id> {
     let has = |names: &[NameOfForce], id: Id| names.iter().any(|name| name.id == id);
-    let other = |name: &NameOfForce| !name.remembers && !has(named, name.id);
-    let another = again.names.iter().any(other);
+    let other = |own: &NameOfForce, name: &NameOfForce| {
+        !name.remembers && !has(named, name.id) && !own.chances.contains(&name.id)
+    };
     let rivals = |id: Id| again.names.iter().any(|name| name.rivals.contains(&id));
     let against = |name: &&NameOfForce| {
         let contradicted = if name.remembers {
             again.remembers_worse && !name.beyond_chain || !again.remembers
         } else {
-            let instead = another || name.weak;
+            let another = || again.names.iter().any(|instead| other(name, instead));
+            let instead = name.weak || another();
             instead && !has(&again.names, name.id) && !rivals(name.id)
         };
         contradicted && name.confidence < BEYOND_REFUTATION
@@ -252,6 +254,7 @@ mod tests {
             weak: false,
             confidence: 0.8,
             rivals: Vec::new(),
+            chances: Vec::new(),
         }
     }
 
@@ -349,6 +352,17 @@ mod tests {
             ..FADE
         };
         assert!(refuted(&[WEAR], &[rivalled], false).is_empty());
+    }
+
+    #[test]
+    fn what_all_recordings_give_a_fair_chance_refutes_nothing() {
+        let unsure = NameOfForce {
+            chances: vec![Id::ThermalFade],
+            ..WEAR
+        };
+        assert!(refuted(std::slice::from_ref(&unsure), &[FADE], false).is_empty());
+        let load = name(Id::LoadSensitivity, false);
+        assert_eq!(refuted(&[unsure], &[FADE, load], false), [Id::WearDrift]);
     }
 
     #[test]
