@@ -118,7 +118,7 @@ pub const BEYOND_REFUTATION: f64 = 0.9;
 /// What speaks for a name that is no memory, nats, below which it has to come out without the kept runs, too, where a chain shows or a
 /// speed is surely out of step: what so little speaks for may be chosen by the errors of the runs (stability selection: Meinshausen and
 /// Buhlmann 2010, J. R. Stat. Soc. B 72). Of five names that do not on 590 development campaigns behind chains, 174 with one
-/// effect, four are false and one is of 0.3 sigma.
+/// effect, four are false and one is of 0.3 sigma. What [`LARGELY_PREDICTED`] bears out is not weak.
 pub const WEAK_NATS: f64 = 16.0;
 /// Least confidence of a name that is said, unless an alias is as likely: of 8 below it on the same sets 2 were true.
 pub const LEAST_CONFIDENCE: f64 = 0.45;
@@ -134,8 +134,6 @@ pub const LEAST_STDS_OF_FIGURE: f64 = 3.0;
 pub const FEW_RUNS_SURE: f64 = 0.9;
 /// Share of a name's likelihood from which nothing in the recordings tells an alias from it.
 pub const TIED: f64 = 0.99;
-/// Share of a name's likelihood from which another is hardly less likely: one softness apart, that is 1/e.
-pub const HARDLY_LESS: f64 = 0.37;
 /// Share of a name's likelihood from which another has a fair chance: the name is the less sure by it, and that it comes out of fewer
 /// recordings contradicts nothing.
 pub const FAIR_CHANCE: f64 = 0.2;

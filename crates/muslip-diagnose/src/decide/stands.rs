@@ -34,11 +34,10 @@ impl Trial {
         (self.gain_that_counts() * self.at_sensors.0.max(0.0)).sqrt()
     }
 
-    /// Whether so little speaks for it that the errors of the runs may have chosen it, and it does not take much of the drag's
-    /// error either.
+    /// Whether so little speaks for it that the errors of the runs may have chosen it, and the drag's error not much either.
     #[must_use]
     pub fn is_weak(&self) -> bool {
-        self.weight() < WEAK_NATS && !lowers_drag_s_error(self.predicts, LARGELY_PREDICTED)
+        self.weight() < WEAK_NATS && !takes_two_fifths(self)
     }
 
     /// What all unseen runs gain by it in nats, at the noise at which it stands: as fitted, or at the sensors' where the
@@ -223,7 +222,7 @@ pub fn left_open(trial: &Trial) -> bool {
     let shows = |nats: f64, predicted: f64| {
         trial.at_sensors.0 > nats && lowers_drag_s_error(trial.predicts, predicted)
     };
-    let few_show = trial.unanimous[1]
+    let few_reach_it = trial.unanimous[1]
         && (shows(
             LEAST_GAIN_OF_DEPENDENCE_AT_SENSORS,
             LINED_UP_PREDICTED_BY_DEPENDENCE,
@@ -231,7 +230,7 @@ pub fn left_open(trial: &Trial) -> bool {
             LARGE_GAIN_OF_DEPENDENCE_AT_SENSORS,
             LEAST_PREDICTED_BY_DEPENDENCE,
         ));
-    let shown = dependence_at_sensors(trial) || few_show;
+    let shown = dependence_at_sensors(trial) || few_reach_it;
     trial.mechanism().is_none() && !stands(trial) && shown
 }
 
@@ -263,7 +262,7 @@ fn lined_up(trial: &Trial) -> bool {
     trial.unanimous[1] && trial.gain > 0.0 && lowers
 }
 
-/// Whether gains are uneven because few of several runs reach what a name is of, or show most of it, which no chain leaves.
+/// Whether gains are uneven because few runs reach what a name is of, or show most of it: they say no less for it.
 #[must_use]
 pub fn few_reach(trial: &Trial) -> bool {
     let several = trial.runs >= FEWEST_RUNS_AGREED;
@@ -301,9 +300,13 @@ fn undisputed(trial: &Trial) -> bool {
 /// Whether a name that no measuring chain leaves gains on several unseen runs, and takes so much of the error of the drag that
 /// it need not gain alike on them: what wears off shows most on the first and the last.
 fn largely_predicts(trial: &Trial) -> bool {
+    trial.gain > LEAST_GAIN && takes_two_fifths(trial)
+}
+
+/// Whether several unseen runs bear out a name that no measuring chain leaves, and that takes two fifths of the error of the drag.
+fn takes_two_fifths(trial: &Trial) -> bool {
     let speaks = several_name(trial, LEAST_T_OF_PREDICTED) && !trial.remembers;
-    let gains = trial.gain > LEAST_GAIN;
-    speaks && gains && lowers_drag_s_error(trial.predicts, LARGELY_PREDICTED)
+    speaks && lowers_drag_s_error(trial.predicts, LARGELY_PREDICTED)
 }
 
 /// Whether the drag's mean square error falls by more than this logarithm. What does not work through the force predicts

@@ -6,7 +6,6 @@ use crate::audit::Audit;
 use crate::campaign::{Rig, Run};
 use crate::chain::recorded::Recorded;
 use crate::chain::timing::Timing;
-use crate::constants::{FAIR_CHANCE, HARDLY_LESS};
 use crate::data::Data;
 use crate::decide::{Asked, Decision, Trial, could_stand, decide, gains_beyond_chain};
 use crate::innovations::hypothesis::{Judged, whole_over_slow};
@@ -34,14 +33,12 @@ pub(super) struct NameOfForce {
     pub(super) remembers: bool,
     /// Whether it gains more than a measuring chain leaves, or rings longer than its filters and gains much.
     pub(super) beyond_chain: bool,
-    /// Whether so little speaks for it that a measuring chain's errors may have chosen it, where one shows or a speed is surely out of
+    /// Whether so little speaks for it ([`Trial::is_weak`]) that a measuring chain's errors may have chosen it, where one shows or a speed is surely out of
     /// step.
     pub(super) weak: bool,
     /// Its confidence.
     pub(super) confidence: f64,
-    /// What its round holds for hardly less likely.
-    pub(super) rivals: Vec<Id>,
-    /// What it gives a fair chance.
+    /// What has a fair chance beside it in its round.
     pub(super) chances: Vec<Id>,
 }
 
@@ -166,10 +163,7 @@ impl<'a> Answer<'a> {
                     weak: chained && taken_up.is_none_or(Trial::is_weak),
                     beyond_chain: taken_up.is_some_and(gains_beyond_chain),
                     confidence: sure.as_ref().map_or(0.0, |own| own.confidence),
-                    rivals: sure
-                        .as_ref()
-                        .map_or(Vec::new(), |own| own.likely(HARDLY_LESS)),
-                    chances: sure.map_or(Vec::new(), |own| own.likely(FAIR_CHANCE)),
+                    chances: sure.map_or(Vec::new(), |own| own.chances()),
                 }
             })
             .collect()

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use super::answer::{Answer, Unsaid, Why};
 use crate::audit::{Ring, Timing};
 use crate::constants::{
-    AUDITED, DOUBTED, FEW_RUNS_SURE, FORM_OF_DELAY_S, LEAST_BRAKE_EARLY_IN_STEP_S,
+    AUDITED, DOUBTED, FAIR_CHANCE, FEW_RUNS_SURE, FORM_OF_DELAY_S, LEAST_BRAKE_EARLY_IN_STEP_S,
     LEAST_CONFIDENCE, LEAST_CONFIDENCE_OF_ALIASES, LEAST_DELAY_S, LEAST_PREDICTED,
     LEAST_STDS_OF_FIGURE, LEAST_T_NOT_FED, PREDICTED_APART, RARE_SHARE, SURE_DELAY, TIED,
     UNKNOWN_STDS, VAGUE_DELAY_S,
@@ -342,9 +342,9 @@ pub(super) struct Sureness {
 }
 
 impl Sureness {
-    /// The others that are more likely than this share of it.
-    pub(super) fn likely(&self, least: f64) -> Vec<Id> {
-        let near = |other: &&Alternative| other.confidence > least * self.share;
+    /// The others that have a fair chance beside it.
+    pub(super) fn chances(&self) -> Vec<Id> {
+        let near = |other: &&Alternative| other.confidence > FAIR_CHANCE * self.share;
         let near = self.others.iter().filter(near);
         near.filter_map(|other| Id::parse(other.id)).collect()
     }

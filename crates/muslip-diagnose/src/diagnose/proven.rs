@@ -215,24 +215,26 @@ fn with_named(audit: &Audit, named: &[NamedMechanism], catalogue: &Catalogue) ->
     chain
 }
 
-/// Names that the same argument without what is kept speaks against: a memory where it knows of none at all, or names one
+/// Names that the same argument without what is kept speaks against. A memory: where that knows of none at all, or names one
 /// with which it predicts what is kept worse than without, for the chain's own kernels do much of what a memory does, but where
-/// it gains more than a chain leaves; any other
-/// where it does not come to that, nor to what is hardly likelier than that, but to another in its place that is no memory and has no
-/// fair chance by all recordings, or where little speaks for it. What all recordings together make sure is not refuted by fewer.
+/// it gains more than a chain leaves. Any other: where that neither comes to it nor leaves it a fair chance, but comes to another in
+/// its place that is no memory and has no fair chance by all recordings, or where little speaks for it. What all recordings together
+/// make sure is not refuted by fewer.
 fn refuted(named: &[NameOfForce], again: &Again) -> Vec<Id> {
     let has = |names: &[NameOfForce], id: Id| names.iter().any(|name| name.id == id);
-    let other = |own: &NameOfForce, name: &NameOfForce| {
-        !name.remembers && !has(named, name.id) && !own.chances.contains(&name.id)
+    let comes_out = |id: Id| {
+        let chance = |own: &NameOfForce| own.chances.contains(&id);
+        has(&again.names, id) || again.names.iter().any(chance)
     };
-    let rivals = |id: Id| again.names.iter().any(|name| name.rivals.contains(&id));
+    let replaced = |name: &NameOfForce| {
+        let mut others = again.names.iter().filter(|own| !own.remembers);
+        others.any(|own| !has(named, own.id) && !name.chances.contains(&own.id))
+    };
     let against = |name: &&NameOfForce| {
         let contradicted = if name.remembers {
             again.remembers_worse && !name.beyond_chain || !again.remembers
         } else {
-            let another = || again.names.iter().any(|instead| other(name, instead));
-            let instead = name.weak || another();
-            instead && !has(&again.names, name.id) && !rivals(name.id)
+            (name.weak || replaced(name)) && !comes_out(name.id)
         };
         contradicted && name.confidence < BEYOND_REFUTATION
     };
@@ -253,7 +255,6 @@ mod tests {
             beyond_chain: false,
             weak: false,
             confidence: 0.8,
-            rivals: Vec::new(),
             chances: Vec::new(),
         }
     }
@@ -346,21 +347,26 @@ mod tests {
     }
 
     #[test]
-    fn what_is_hardly_less_likely_than_what_comes_out_is_not_refuted_by_it() {
-        let rivalled = NameOfForce {
-            rivals: vec![Id::WearDrift],
+    fn what_has_a_fair_chance_beside_what_comes_out_is_not_refuted_by_it() {
+        let unsure = NameOfForce {
+            chances: vec![Id::WearDrift],
             ..FADE
         };
-        assert!(refuted(&[WEAR], &[rivalled], false).is_empty());
+        assert!(refuted(&[WEAR], &[unsure], false).is_empty());
     }
 
     #[test]
-    fn what_all_recordings_give_a_fair_chance_refutes_nothing() {
+    fn what_all_recordings_give_a_fair_chance_refutes_only_what_is_weak() {
         let unsure = NameOfForce {
             chances: vec![Id::ThermalFade],
             ..WEAR
         };
         assert!(refuted(std::slice::from_ref(&unsure), &[FADE], false).is_empty());
+        let weak = NameOfForce {
+            weak: true,
+            ..unsure.clone()
+        };
+        assert_eq!(refuted(&[weak], &[FADE], false), [Id::WearDrift]);
         let load = name(Id::LoadSensitivity, false);
         assert_eq!(refuted(&[unsure], &[FADE, load], false), [Id::WearDrift]);
     }

@@ -16,7 +16,7 @@ pub struct Form {
     pub phase_per_run: bool,
 }
 
-/// What varies where no brake tells a rolling radius from an encoder that ripples, for what acts on the wheel is not known.
+/// What varies once a turn, as far as it is known before any fit: a rolling radius, or what an encoder reads.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Varies {
     /// Whichever the wheel's balance bears out: there is a brake.
@@ -148,5 +148,30 @@ impl Form {
         }
         let amplitude = (power / phases).sqrt() * factor;
         vec![Reported::new("amplitude", "1", amplitude)]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mechanism::catalogue;
+
+    #[test]
+    fn what_the_reading_lacks_is_rarely_an_encoder_s_and_what_it_has_rarely_a_radius_s() {
+        let rare = |ripple_unread: bool| -> Vec<(&str, &str)> {
+            let context = Context {
+                ripple_unread,
+                ..Context::default()
+            };
+            let all = catalogue::<f64>();
+            let rare = all.iter().filter(|own| own.is_rare(&context));
+            rare.map(|own| (own.id().as_str(), own.form())).collect()
+        };
+        let radius = ["radius", "radius_phase_per_run"].map(|form| ("run_out", form));
+        let encoder = FORMS.map(|form| ("encoder_ripple", form.as_str()));
+        assert_eq!(
+            (rare(false), rare(true)),
+            (radius.to_vec(), encoder.to_vec())
+        );
     }
 }
