@@ -34,7 +34,8 @@ impl Trial {
         (self.gain_that_counts() * self.at_sensors.0.max(0.0)).sqrt()
     }
 
-    /// Whether so little speaks for it that the errors of the runs may have chosen it, and the drag's error not much either.
+    /// Whether so little speaks for it that the errors of the runs may have chosen it, and it takes no two fifths of the drag's
+    /// error either.
     #[must_use]
     pub fn is_weak(&self) -> bool {
         self.weight() < WEAK_NATS && !takes_two_fifths(self)
