@@ -386,6 +386,14 @@ fn imbalance<T: Number>(
         .collect()
 }
 
+/// The drag by its reading, with `chain` taken off, where the reading's scale is wrong. Deviations from the base model act on smoothed
+/// columns, so that a parameter cannot buy anything by scaling noise.
+fn drag<T: Listed>(state: &State<T>, series: &Series, chain: Option<&[f64]>, k: usize) -> T {
+    let chain = chain.map_or(0.0, |c| c[k]);
+    let smooth = series.drag_smooth[k] - chain;
+    (state.true_share(smooth) - 1.0) * smooth + (series.drag[k] - chain)
+}
+
 /// Imbalance of the wheel, one value a step ending at each sample:
 /// J Δω/Δt − R drag + brake torque + what the terms add, in N m, with `chain` (reading minus contact
 /// force, from the tyre model) taken off the drag reading.
@@ -403,11 +411,7 @@ pub fn wheel<T: Listed>(
     };
     let state = acting(catalogue, model, p, series, context, Stage::Wheel);
     let opposing = |k: usize| {
-        // Deviations from the base model act on smoothed columns, so that a parameter cannot buy
-        // anything by scaling noise.
-        let chain = chain.map_or(0.0, |c| c[k]);
-        let smooth = series.drag_smooth[k] - chain;
-        let drag = (state.true_share(smooth) - 1.0) * smooth + (series.drag[k] - chain);
+        let drag = drag(&state, series, chain, k);
         let brake = state.brake[k] + (torque.raw[k] - torque.smooth[k]);
         state.inertia_change * (context.inertia * series.wheel.rate[k]) - drag * context.radius
             + brake
@@ -431,11 +435,8 @@ pub fn vehicle<T: Listed>(
     }
     let state = acting(catalogue, model, p, series, context, Stage::Vehicle);
     let force = |k: usize| {
-        let chain = chain.map_or(0.0, |c| c[k]);
-        let smooth = series.drag_smooth[k] - chain;
         state.inertia_change * (context.mass * series.speed.rate[k])
-            + (state.true_share(smooth) - 1.0) * smooth
-            + (series.drag[k] - chain)
+            + drag(&state, series, chain, k)
             + state.opposing[k]
     };
     imbalance(context.mass, &series.speed.raw, &series.dt, force)

@@ -458,7 +458,7 @@ mod tests {
     }
 
     #[test]
-    fn a_piece_in_which_the_slip_changes_weighs_little() {
+    fn a_piece_that_leaves_much_beside_the_ripple_weighs_little() {
         // A tenth as much noise weighs a hundred times as much.
         let weight = |noise: f64| {
             let angle: Vec<f64> = (0..300).map(|k| 0.0628 * f64::from(k)).collect();

@@ -33,8 +33,8 @@ pub(super) struct NameOfForce {
     pub(super) remembers: bool,
     /// Whether it gains more than a measuring chain leaves, or rings longer than its filters and gains much.
     pub(super) beyond_chain: bool,
-    /// Whether so little speaks for it ([`Trial::is_weak`]) that a measuring chain's errors may have chosen it, where one shows or a speed is surely out of
-    /// step.
+    /// Whether so little speaks for it ([`Trial::is_weak`]) that a measuring chain's errors may have chosen it, where one shows or a
+    /// speed is surely out of step.
     pub(super) weak: bool,
     /// Its confidence.
     pub(super) confidence: f64,

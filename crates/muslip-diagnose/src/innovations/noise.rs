@@ -630,7 +630,7 @@ impl BalanceParts {
 mod tests {
     use super::*;
     use crate::innovations::rows::tyre_row_of;
-    use crate::innovations::toy::{CRITICAL, Noise, PEAK, entry_of, stop};
+    use crate::innovations::toy::{CRITICAL, Noise, PEAK, entry_of, entry_of_form, stop};
     use crate::mechanism::Id;
     use crate::model::Term;
 
@@ -669,11 +669,9 @@ mod tests {
     #[test]
     fn a_slip_that_is_off_over_a_run_is_so_behind_a_filter_of_the_slip() {
         let data = stop(Noise::TYPICAL, 5);
-        let mut entries = data.catalogue.entries().iter();
-        let of_slip = entries.position(|m| m.id() == Id::RelaxationLength && m.form() == "slip");
         let mut relaxed = Model::of_law(PEAK, CRITICAL);
         relaxed.terms.push(Term {
-            entry: of_slip.unwrap(),
+            entry: entry_of_form(&data, Id::RelaxationLength, "slip"),
             parameters: vec![2.0],
         });
         let slopes = Slopes::new(&data, &relaxed);
@@ -697,15 +695,9 @@ mod tests {
             let scale = s.load.smooth[k] * PEAK / CRITICAL;
             assert!((plain.slip[0][k] - expected).abs() < 1e-5 * scale, "{k}");
         }
-        let entries = data.catalogue.entries().iter();
-        let entry = entries
-            .enumerate()
-            .find(|(_, m)| m.id() == Id::WearDrift && m.form() == "energy")
-            .map(|(entry, _)| entry)
-            .unwrap();
         let mut worn = law;
         worn.terms.push(Term {
-            entry,
+            entry: entry_of_form(&data, Id::WearDrift, "energy"),
             parameters: vec![0.7],
         });
         let worn = Slopes::new(&data, &worn);

@@ -342,7 +342,7 @@ pub fn integrated<T: Number>(
 mod tests {
     use super::*;
     use crate::innovations::hypothesis::{Guess, judge};
-    use crate::innovations::toy::{EFFORT, Noise, settled, stop, with_term};
+    use crate::innovations::toy::{EFFORT, Noise, entry_of_form, settled, stop, with_term};
     use crate::mechanism::Id;
     use crate::number::mean_and_std;
 
@@ -417,9 +417,7 @@ mod tests {
             }
             let law = settled(&data);
             let mut model = with_term(&data, &law, Id::ForceGain, 0.0);
-            let mut forms = data.catalogue.entries().iter();
-            let bent = forms.position(|own| own.id() == Id::ForceGain && own.form() == "bent");
-            model.terms[0].entry = bent.unwrap();
+            model.terms[0].entry = entry_of_form(&data, Id::ForceGain, "bent");
             model.terms[0].parameters = vec![0.0; 2];
             let judged = judge(&data, &model, &[], Guess::None, EFFORT).unwrap();
             judged.model.terms[0].parameters[1]

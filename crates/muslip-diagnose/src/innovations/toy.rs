@@ -172,6 +172,14 @@ pub fn entry_of(data: &Data, id: Id) -> usize {
     entries.iter().position(|m| m.id() == id).unwrap()
 }
 
+/// The entry of a mechanism's form.
+pub fn entry_of_form(data: &Data, id: Id, form: &str) -> usize {
+    let mut entries = data.catalogue.entries().iter();
+    entries
+        .position(|m| m.id() == id && m.form() == form)
+        .unwrap()
+}
+
 /// A judged model with one term more.
 pub fn with_term(data: &Data, judged: &Judged, id: Id, parameter: f64) -> Model {
     let mut model = judged.model.clone();
