@@ -9,6 +9,8 @@
 use core::iter::zip;
 use core::ops::Range;
 
+use crate::number::Number;
+
 /// One part that has a state: of variance one, forgotten with time.
 pub struct State {
     /// Time in s after which it is forgotten; infinite where it stays what it is over a run.
@@ -123,41 +125,41 @@ impl LawError {
     }
 
     /// What is to be expected of the law's error in N at each block, of the mean of what is read there beyond the law.
-    fn expected(&self, read: &[f64]) -> Vec<f64> {
+    fn expected<T: Number>(&self, read: &[T]) -> Vec<T> {
         let m = self.states.len();
         let mut kept = Kept::new(m);
-        let mut state = vec![0.0; m];
+        let zero = T::constant(0.0);
+        let mut state = vec![zero; m];
         let mut innovations = Vec::with_capacity(read.len());
         let mut out = Vec::with_capacity(read.len());
         for (block, read) in read.iter().enumerate() {
             let own = block * m..(block + 1) * m;
             let kept = kept.after(self.since(block), &self.states);
-            let (mut innovation, mut force) = (*read, 0.0);
+            let (mut innovation, mut force) = (*read, zero);
             for (i, gain) in self.gain[own.clone()].iter().enumerate() {
-                state[i] *= kept[i];
-                innovation -= gain * state[i];
+                state[i] = state[i] * kept[i];
+                innovation = innovation - state[i] * *gain;
                 if self.states[i].1 {
-                    force += gain * state[i];
+                    force += state[i] * *gain;
                 }
             }
             for (state, update) in zip(&mut state, &self.update[own]) {
-                *state += update * innovation;
+                *state += innovation * *update;
             }
             innovations.push(innovation);
             out.push(force);
         }
-        let mut adjoint = vec![0.0; m];
+        let mut adjoint = vec![zero; m];
         for block in (0..read.len()).rev() {
             let own = block * m..(block + 1) * m;
-            let back: f64 = zip(&adjoint, &self.update[own.clone()])
-                .map(|(a, u)| a * u)
-                .sum();
+            let back = zip(&adjoint, &self.update[own.clone()]);
+            let back = back.fold(zero, |sum, (a, u)| sum + *a * *u);
             let told = innovations[block] / self.variance[block] - back;
             let kept = kept.after(self.since(block), &self.states);
             for (i, gain) in self.gain[own].iter().enumerate() {
-                adjoint[i] += gain * told;
-                out[block] += self.of_force[block * m + i] * adjoint[i];
-                adjoint[i] *= kept[i];
+                adjoint[i] += told * *gain;
+                out[block] += adjoint[i] * self.of_force[block * m + i];
+                adjoint[i] = adjoint[i] * kept[i];
             }
         }
         out
@@ -166,15 +168,17 @@ impl LawError {
     /// The same at each sample in N, of what is read beyond the law at each: straight between blocks that touch, nothing
     /// outside of them.
     #[must_use]
-    pub fn at_samples(&self, time: &[f64], beyond: &[f64]) -> Vec<f64> {
+    pub fn at_samples<T: Number>(&self, time: &[f64], beyond: &[T]) -> Vec<T> {
         let mean = |samples: &Range<usize>| {
-            let own = beyond[samples.clone()].iter().filter(|x| x.is_finite());
-            let (sum, count) = own.fold((0.0, 0.0), |(sum, count), x| (sum + x, count + 1.0));
+            let own = beyond[samples.clone()].iter();
+            let own = own.filter(|x| x.value().is_finite());
+            let nothing = (T::constant(0.0), 0.0);
+            let (sum, count) = own.fold(nothing, |(sum, count), x| (sum + *x, count + 1.0));
             sum / f64::max(count, 1.0)
         };
-        let read: Vec<f64> = self.samples.iter().map(mean).collect();
+        let read: Vec<T> = self.samples.iter().map(mean).collect();
         let expected = self.expected(&read);
-        let mut out = vec![0.0; time.len()];
+        let mut out = vec![T::constant(0.0); time.len()];
         for (block, samples) in self.samples.iter().enumerate() {
             let touches = |a: usize, b: usize| {
                 let next = self.samples.get(b);
@@ -188,7 +192,7 @@ impl LawError {
                 };
                 let share = (time[k] - self.time[from]) / (self.time[to] - self.time[from]);
                 let share = if from == to { 0.0 } else { share };
-                out[k] = expected[from] + share * (expected[to] - expected[from]);
+                out[k] = expected[from] + (expected[to] - expected[from]) * share;
             }
         }
         out

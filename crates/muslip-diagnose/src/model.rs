@@ -262,7 +262,7 @@ pub fn tyre<T: Listed>(
 }
 
 /// Reach in s of the means twice over that leave out of the force what is fast in it: mostly the slip's noise.
-const FAST_S: f64 = 0.005;
+pub const FAST_S: f64 = 0.005;
 
 /// What a model's filters between contact and reading add to what is fast in the force that enters them, in N.
 pub fn added_to_fast<T: Listed>(

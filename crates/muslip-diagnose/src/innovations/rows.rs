@@ -9,8 +9,9 @@ use core::iter::zip;
 
 use crate::data::{Catalogue, Data, Listed};
 use crate::mechanism::{Balance, Context, Stage, State};
-use crate::model::{Model, acting, added_to_fast, tyre};
+use crate::model::{FAST_S, Model, Term, acting, added_to_fast, filtered, tyre};
 use crate::number::Number;
+use crate::prepare::mean_twice_about;
 use crate::series::{Channel, Series};
 
 /// Rows of one run by balance, in the order tyre, wheel, vehicle.
@@ -96,16 +97,31 @@ pub fn quiet_force(series: &Series, law: &[f64]) -> Vec<f64> {
         .collect()
 }
 
+/// What the reading says in N that a model of it is off by, its own noise apart: what it was last where the tyre's balance is
+/// not formed, nothing where no error of the law is told from noise yet.
+fn law_is_off_by<T: Number>(series: &Series, by_model: &[T]) -> Option<Vec<T>> {
+    let law_error = series.law_error.as_ref()?;
+    let left = zip(&series.drag, by_model).map(|(y, f)| -*f + *y);
+    let mut off = law_error.at_samples(&series.time, &left.collect::<Vec<T>>());
+    let mut formed = series.tyre.iter().flat_map(Clone::clone).peekable();
+    let mut last = T::constant(0.0);
+    for (k, off) in off.iter_mut().enumerate() {
+        if formed.next_if_eq(&k).is_some() {
+            last = *off;
+        }
+        *off = last;
+    }
+    Some(off)
+}
+
 /// The force by a model of the reading in N, with what the reading says that it is off by: a few percent, which integrated
 /// are more than the speeds' noise. The reading's own noise must not be in it, or what scales the force buys it: a mass
 /// came out as three times itself. Where the tyre's balance is not formed it is as [`quiet_force`] has it.
 fn calibrated_force(series: &Series, by_model: &[f64]) -> Vec<f64> {
     let mut force = quiet_force(series, by_model);
-    let Some(law_error) = &series.law_error else {
+    let Some(off) = law_is_off_by(series, by_model) else {
         return force;
     };
-    let left: Vec<f64> = zip(&series.drag, by_model).map(|(y, f)| y - f).collect();
-    let off = law_error.at_samples(&series.time, &left);
     for k in series.tyre.iter().flat_map(Clone::clone) {
         force[k] = by_model[k] + off[k];
     }
@@ -219,7 +235,7 @@ struct Force<'a, T> {
 
 /// What a model says that the load cell adds to the force in the contact, in N. What its filters take is made of the force
 /// without what is fast in it: integrated, the slip's noise stays in every level, times their delay, and none but the
-/// shortest delays paid for that.
+/// shortest delays paid for that. What lags or is late takes of the law's error, too, as the reading says it.
 fn added_by_load_cell<T: Listed>(
     catalogue: &Catalogue,
     model: &Model,
@@ -235,8 +251,50 @@ fn added_by_load_cell<T: Listed>(
         for (added, fast) in added.iter_mut().zip(fast) {
             *added = *added - fast;
         }
+        let memory_s = remembered_s(catalogue, model, context);
+        let off = (memory_s > 0.0).then(|| law_is_off_by(series, &tyre.force));
+        if let Some(off) = off.flatten() {
+            let reach = f64::max(FAST_S, MEMORIES * memory_s);
+            let slow = mean_twice_about(&series.time, &off, &series.tyre, reach);
+            add_to_what_is_off(slow, &mut added, |x| {
+                filtered(catalogue, model, p, FROM, series, context, x)
+            });
+        }
     }
     Some(added)
+}
+
+/// The stage from which on filters act on the law's error: what makes a structure ring is not told from its ringing.
+const FROM: Stage = Stage::Filter;
+
+/// Over so many memories of the filters, either way, means twice over are taken of what the law is off by: what goes faster
+/// is what another filter would have made of the law's own force.
+const MEMORIES: f64 = 2.0;
+
+/// How long in s a model's filters of the law's error remember, one after the other.
+fn remembered_s(catalogue: &Catalogue, model: &Model, context: &Context) -> f64 {
+    let own_s = |term: &Term| {
+        let mechanism = catalogue.get(term.entry);
+        let facts = mechanism.facts();
+        let filters = facts.filters && facts.stage >= FROM;
+        filters.then(|| mechanism.memory_s(&term.parameters, context))?
+    };
+    model.terms.iter().filter_map(own_s).sum()
+}
+
+/// Adds what filters add to what the law is off by, as it is read: it has been through them like all of the force. What it
+/// was before them is, but for the second order, what is read and what they take of that.
+fn add_to_what_is_off<T: Number>(
+    read: Vec<T>,
+    added: &mut [T],
+    filtered: impl Fn(Vec<T>) -> Vec<T>,
+) {
+    let again = filtered(read.clone());
+    let before: Vec<T> = zip(&read, again).map(|(x, y)| *x + (*x - y)).collect();
+    let after = filtered(before.clone());
+    for ((added, after), before) in added.iter_mut().zip(after).zip(before) {
+        *added += after - before;
+    }
 }
 
 impl<'a, T: Number> Force<'a, T> {
@@ -342,7 +400,10 @@ pub fn integrated<T: Number>(
 mod tests {
     use super::*;
     use crate::innovations::hypothesis::{Guess, judge};
-    use crate::innovations::toy::{EFFORT, Noise, entry_of_form, settled, stop, with_term};
+    use crate::innovations::noise::{Slopes, parts};
+    use crate::innovations::toy::{
+        CRITICAL, EFFORT, Noise, PEAK, entry_of, entry_of_form, settled, stop, with_term,
+    };
     use crate::mechanism::Id;
     use crate::number::mean_and_std;
 
@@ -379,6 +440,59 @@ mod tests {
             left < 0.15 * rms(series, off),
             "{left} {}",
             rms(series, off)
+        );
+    }
+
+    #[test]
+    fn what_the_law_is_off_by_comes_as_late_as_the_force() {
+        let noise = Noise {
+            drag: 3.0,
+            torque: 1.0,
+            ..Noise::FINE_WHEEL
+        };
+        let mut data = stop(noise, 4);
+        let delay_s = 0.02;
+        let series = &mut data.series[0];
+        // A drag that is late, and friction that comes and goes, which no law knows of: in the wheel's balance what the drag
+        // is off by now is what friction was off by then.
+        let late = (delay_s / series.typical_dt).round() as usize;
+        let off = |time: f64| 0.15 * (25.0 * time).sin();
+        for k in (late..series.len()).rev() {
+            series.drag[k] = series.drag[k - late] * (1.0 + off(series.time[k - late]));
+        }
+        let acted: Vec<f64> = series.drag[late..].to_vec();
+        let torque = series.torque.as_mut().unwrap();
+        let radius = data.context.radius;
+        for (k, drag) in acted.into_iter().enumerate() {
+            let more = radius * drag * off(series.time[k]) / (1.0 + off(series.time[k]));
+            torque.raw[k] += more;
+            torque.smooth[k] += more;
+        }
+        let law = Model::of_law(PEAK, CRITICAL);
+        let mut parts = parts(&data, &Slopes::new(&data, &law));
+        let fast = parts[0]
+            .sources
+            .iter_mut()
+            .find(|s| s.name == "friction, fast");
+        fast.unwrap().log_std = f64::ln(0.1);
+        let mut delayed = law;
+        delayed.terms.push(Term {
+            entry: entry_of(&data, Id::ForceDelay),
+            parameters: vec![delay_s],
+        });
+        // What moves within a second: a level means nothing.
+        let moves = |data: &Data| {
+            let series = &data.series[0];
+            let level = rows_of(data, &delayed, 0).wheel;
+            let slow = mean_twice_about(&series.time, &level, &series.wheel_balance, 0.2);
+            rms(series, |k| level[k] - slow[k])
+        };
+        let by_law_alone = moves(&data);
+        data.tell_law_error(&parts);
+        let with_its_error = moves(&data);
+        assert!(
+            with_its_error < 0.5 * by_law_alone,
+            "{with_its_error} {by_law_alone}"
         );
     }
 
