@@ -145,6 +145,12 @@ pub const PREDICTED_APART: f64 = 0.1;
 /// of the vocabulary are within some five percent of what they stand for.
 pub const FORM_LEFT: f64 = 0.1;
 
+// Memories of the chain's.
+
+/// By how many times another memory of the chain's outweighs one of which no more counts than what it gains beside that
+/// other: more than the forms of one memory differ by.
+pub const FAR_HEAVIER: f64 = 2.0;
+
 // Free dependences.
 
 /// A free dependence is told instead of a mechanism where it gains so many times as much: a mechanism in the wrong form

@@ -1,7 +1,9 @@
 //! Whose memory it is: a tyre's goes by how far it has rolled, a chain's by the clock.
 
+use super::next::touches;
 use super::rank::{much_more, softness};
 use super::trial::Trial;
+use crate::constants::FAR_HEAVIER;
 use crate::data::Data;
 use crate::mechanism::{Balance, Id, Kind, Memory};
 
@@ -14,6 +16,18 @@ pub fn outweighs(memory: &Trial, trial: &Trial) -> bool {
         softness(memory.weight())
     };
     memory.weight() - trial.weight() > least
+}
+
+/// The heaviest of these that far outweighs a memory of the chain's and touches a balance of its own: a brake that comes late
+/// is a drag that does, in the wheel's balance, and says nothing of the tyre's.
+pub fn far_heavier<'a>(data: &Data, memory: &Trial, all: &'a [Trial]) -> Option<&'a Trial> {
+    let own = touches(data, memory);
+    let could_leave_it = |other: &&Trial| {
+        let outweighs = other.weight() > FAR_HEAVIER * memory.weight();
+        outweighs && touches(data, other).iter().any(|of| own.contains(of))
+    };
+    let heavier = all.iter().filter(could_leave_it);
+    heavier.max_by(|a, b| a.weight().total_cmp(&b.weight()))
 }
 
 /// Whose memory of the tyre's balance a trial is of.
@@ -101,6 +115,28 @@ mod tests {
             clocks_of(&data),
             [Id::ForceDelay, Id::ForceLag, Id::StructuralResonance]
         );
+    }
+
+    #[test]
+    fn a_memory_is_asked_for_beside_the_heaviest_that_could_leave_it_in_a_balance_of_both() {
+        let data = stop(Noise::TYPICAL, 4);
+        let base = toy::settled(&data);
+        let of = |id, nats| of_name(&data, &base, id, nats, 3.0);
+        let all = [
+            of(Id::BrakeLag, 1300.0),
+            of(Id::WheelInertia, 1500.0),
+            of(Id::CurveShape, 2000.0),
+            of(Id::ForceLag, 900.0),
+        ];
+        let heavier = |id, nats| {
+            let other = far_heavier(&data, &of(id, nats), &all)?;
+            Some(other.mechanism()?.0)
+        };
+        assert_eq!(heavier(Id::ForceDelay, 500.0), Some(Id::CurveShape));
+        // A curve is the tyre's alone.
+        assert_eq!(heavier(Id::BrakeLag, 700.0), Some(Id::WheelInertia));
+        assert_eq!(heavier(Id::CurveShape, 1300.0), None);
+        assert_eq!(heavier(Id::ForceDelay, 1001.0), None);
     }
 
     #[test]

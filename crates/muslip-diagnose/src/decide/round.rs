@@ -1,7 +1,9 @@
 //! One round: what is tried beside the model so far, and what of it is the chain's.
 
 use super::finalists::{Screen, effort};
-use super::memory::{clocks_of, gains_of, memory_of, outweighs, says_much_more, tell_from_clocks};
+use super::memory::{
+    clocks_of, far_heavier, gains_of, memory_of, outweighs, says_much_more, tell_from_clocks,
+};
 use super::next::{TakenUp, could_be_taken, next, touches};
 use super::rank::rank;
 use super::refuted::refute;
@@ -117,7 +119,7 @@ impl Question<'_> {
 
     /// Holds names that stand, or could in another's place, beside each memory of the chain's that outweighs them: torque
     /// or drag that comes late is an inertia, too, where nothing else is asked. Memories are among the trials and those
-    /// `beside` them.
+    /// `beside` them; of one that a far heavier one may leave counts what it gains beside that.
     fn hold_beside_chain(&self, beside: &[Trial], trials: &mut [Trial], taken_up: &TakenUp) {
         let data = self.data;
         let of_chain = |t: &&Trial| !t.outlasts_chain;
@@ -127,36 +129,56 @@ impl Question<'_> {
             .filter(of_chain)
             .cloned()
             .collect();
-        for memory in memories {
-            let of_memory = touches(data, &memory);
-            let outweighed = |trial: &&mut Trial| {
+        for memory in &memories {
+            let of_memory = touches(data, memory);
+            let held = |trial: &Trial| {
                 let named = trial.mechanism().is_some() && could_be_taken(trial);
-                named
-                    && !trial.remembers
-                    && of_memory.contains(&trial.claim.balance(data))
-                    && outweighs(&memory, trial)
+                named && !trial.remembers && of_memory.contains(&trial.claim.balance(data))
             };
-            let mut outweighed = trials.iter_mut().filter(outweighed).peekable();
+            let outweighed =
+                |trial: &Trial, memory: &Trial| held(trial) && outweighs(memory, trial);
+            if !trials.iter().any(|trial| outweighed(trial, memory)) {
+                continue;
+            }
+            let left = far_heavier(data, memory, &memories).and_then(|other| {
+                self.beside_memory(other, taken_up, |before| {
+                    beside_others(data, memory, before)
+                })
+            });
+            let own = left.as_ref().unwrap_or(memory);
+            let mut outweighed = trials
+                .iter_mut()
+                .filter(|trial| outweighed(trial, own))
+                .peekable();
             if outweighed.peek().is_none() {
                 continue;
             }
-            let with_memory = settled(data, under_own_noise(data, memory.judged.clone()));
-            let at_sensors = taken_up.at_sensors + memory.at_sensors.0.max(0.0);
-            let before = Before::new(data, &with_memory, self.untold, at_sensors);
-            for trial in outweighed {
-                trial.beside_chain = stands_beside(data, trial, &before);
-            }
+            self.beside_memory(memory, taken_up, |before| {
+                for trial in outweighed {
+                    trial.beside_chain = stands_beside(data, trial, before);
+                }
+            });
         }
+    }
+
+    /// What is to be said beside a model that has a memory.
+    fn beside_memory<R>(
+        &self,
+        memory: &Trial,
+        taken_up: &TakenUp,
+        say: impl FnOnce(&Before<'_>) -> R,
+    ) -> R {
+        let data = self.data;
+        let with_memory = settled(data, under_own_noise(data, memory.judged.clone()));
+        let at_sensors = taken_up.at_sensors + memory.at_sensors.0.max(0.0);
+        say(&Before::new(data, &with_memory, self.untold, at_sensors))
     }
 }
 
-/// Whether a mechanism could still be taken beside a model that has what it was tried without. How large it is was settled
-/// where it was tried; what cannot be judged beside the other is not told from it.
-fn stands_beside(data: &Data, trial: &Trial, before: &Before<'_>) -> bool {
+/// A mechanism beside a model that has what it was tried without; nothing where it cannot be judged there.
+fn beside_others(data: &Data, trial: &Trial, before: &Before<'_>) -> Option<Trial> {
     let with_other = before.judged;
-    let Some((_, entry)) = trial.mechanism() else {
-        return false;
-    };
+    let (_, entry) = trial.mechanism()?;
     let mut model = with_other.model.clone();
     let own = trial.judged.model.terms.iter().filter(|t| t.entry == entry);
     model.terms.extend(own.cloned());
@@ -166,11 +188,16 @@ fn stands_beside(data: &Data, trial: &Trial, before: &Before<'_>) -> bool {
         &with_other.extra,
         before.beside(),
         effort(data),
-    );
-    both.is_some_and(|both| {
-        let again = before.tried(trial.claim.clone(), both, trial.size);
-        stands(&again) || !stands(trial) && could_stand(&again)
-    })
+    )?;
+    // How large it is was settled where it was tried.
+    Some(before.tried(trial.claim.clone(), both, trial.size))
+}
+
+/// Whether a mechanism could still be taken beside a model that has what it was tried without; what cannot be judged there is
+/// not told from it.
+fn stands_beside(data: &Data, trial: &Trial, before: &Before<'_>) -> bool {
+    beside_others(data, trial, before)
+        .is_some_and(|again| stands(&again) || !stands(trial) && could_stand(&again))
 }
 
 #[cfg(test)]

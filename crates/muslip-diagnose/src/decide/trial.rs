@@ -98,7 +98,8 @@ pub struct Trial {
     pub lasts: bool,
     /// Whether its memory is longer than what the chain's own timing was off by, and no longer than the channels show.
     pub outlasts_chain: bool,
-    /// Whether it stands beside every memory of the chain's that outweighs it and touches its balance.
+    /// Whether it stands beside every memory of the chain's that outweighs it, is none that another leaves, and touches its
+    /// balance.
     pub beside_chain: bool,
     /// Readings in the balances that are judged.
     pub readings: usize,
