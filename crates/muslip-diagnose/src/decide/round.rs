@@ -131,30 +131,29 @@ impl Question<'_> {
             .collect();
         for memory in &memories {
             let of_memory = touches(data, memory);
-            let held = |trial: &Trial| {
+            let outweighed = |trial: &Trial, memory: &Trial| {
                 let named = trial.mechanism().is_some() && could_be_taken(trial);
-                named && !trial.remembers && of_memory.contains(&trial.claim.balance(data))
+                named
+                    && !trial.remembers
+                    && of_memory.contains(&trial.claim.balance(data))
+                    && outweighs(memory, trial)
             };
-            let outweighed =
-                |trial: &Trial, memory: &Trial| held(trial) && outweighs(memory, trial);
-            if !trials.iter().any(|trial| outweighed(trial, memory)) {
-                continue;
-            }
-            let left = far_heavier(data, memory, &memories).and_then(|other| {
+            let mut held: Vec<&mut Trial> = trials.iter_mut().collect();
+            held.retain(|trial| outweighed(trial, memory));
+            let heavier = far_heavier(data, memory, &memories).filter(|_| !held.is_empty());
+            let left = heavier.and_then(|other| {
                 self.beside_memory(other, taken_up, |before| {
                     beside_others(data, memory, before)
                 })
             });
-            let own = left.as_ref().unwrap_or(memory);
-            let mut outweighed = trials
-                .iter_mut()
-                .filter(|trial| outweighed(trial, own))
-                .peekable();
-            if outweighed.peek().is_none() {
+            if let Some(left) = left {
+                held.retain(|trial| outweighed(trial, &left));
+            }
+            if held.is_empty() {
                 continue;
             }
             self.beside_memory(memory, taken_up, |before| {
-                for trial in outweighed {
+                for trial in held {
                     trial.beside_chain = stands_beside(data, trial, before);
                 }
             });

@@ -97,12 +97,11 @@ pub fn quiet_force(series: &Series, law: &[f64]) -> Vec<f64> {
         .collect()
 }
 
-/// What the reading says in N that a model of it is off by, its own noise apart: what it was last where the tyre's balance is
-/// not formed, nothing where no error of the law is told from noise yet.
-fn law_is_off_by<T: Number>(series: &Series, by_model: &[T]) -> Option<Vec<T>> {
+/// What of what a model leaves of the reading, in N, the law is off by, the reading's own noise apart: what it was last where
+/// the tyre's balance is not formed, nothing where no error of the law is told from noise yet.
+fn law_is_off_by<T: Number>(series: &Series, left: &[T]) -> Option<Vec<T>> {
     let law_error = series.law_error.as_ref()?;
-    let left = zip(&series.drag, by_model).map(|(y, f)| -*f + *y);
-    let mut off = law_error.at_samples(&series.time, &left.collect::<Vec<T>>());
+    let mut off = law_error.at_samples(&series.time, left);
     let mut formed = series.tyre.iter().flat_map(Clone::clone).peekable();
     let mut last = T::constant(0.0);
     for (k, off) in off.iter_mut().enumerate() {
@@ -119,7 +118,7 @@ fn law_is_off_by<T: Number>(series: &Series, by_model: &[T]) -> Option<Vec<T>> {
 /// came out as three times itself. Where the tyre's balance is not formed it is as [`quiet_force`] has it.
 fn calibrated_force(series: &Series, by_model: &[f64]) -> Vec<f64> {
     let mut force = quiet_force(series, by_model);
-    let Some(off) = law_is_off_by(series, by_model) else {
+    let Some(off) = law_is_off_by(series, &tyre_row(series, by_model.to_vec())) else {
         return force;
     };
     for k in series.tyre.iter().flat_map(Clone::clone) {
@@ -132,10 +131,10 @@ fn calibrated_force(series: &Series, by_model: &[f64]) -> Vec<f64> {
 /// not formed, or no error of the law is told from noise yet.
 #[must_use]
 pub fn noise_of_drag(series: &Series, left: &[f64]) -> Vec<f64> {
-    let Some(law_error) = series.law_error.as_ref().filter(|_| !left.is_empty()) else {
+    let off = (!left.is_empty()).then(|| law_is_off_by(series, left));
+    let Some(off) = off.flatten() else {
         return Vec::new();
     };
-    let off = law_error.at_samples(&series.time, left);
     let mut noise = vec![0.0; series.len()];
     for k in series.tyre.iter().flat_map(Clone::clone) {
         noise[k] = left[k] - off[k];
@@ -252,20 +251,21 @@ fn added_by_load_cell<T: Listed>(
             *added = *added - fast;
         }
         let memory_s = remembered_s(catalogue, model, context);
-        let off = (memory_s > 0.0).then(|| law_is_off_by(series, &tyre.force));
+        let off =
+            (memory_s > 0.0).then(|| law_is_off_by(series, &tyre_row(series, tyre.force.clone())));
         if let Some(off) = off.flatten() {
             let reach = f64::max(FAST_S, MEMORIES * memory_s);
             let slow = mean_twice_about(&series.time, &off, &series.tyre, reach);
             add_to_what_is_off(slow, &mut added, |x| {
-                filtered(catalogue, model, p, FROM, series, context, x)
+                filtered(catalogue, model, p, ERROR_ENTERS, series, context, x)
             });
         }
     }
     Some(added)
 }
 
-/// The stage from which on filters act on the law's error: what makes a structure ring is not told from its ringing.
-const FROM: Stage = Stage::Filter;
+/// The stage at which the law's error enters the filters: what makes a structure ring is not told from its ringing.
+const ERROR_ENTERS: Stage = Stage::Filter;
 
 /// Over so many memories of the filters, either way, means twice over are taken of what the law is off by: what goes faster
 /// is what another filter would have made of the law's own force.
@@ -276,7 +276,7 @@ fn remembered_s(catalogue: &Catalogue, model: &Model, context: &Context) -> f64 
     let own_s = |term: &Term| {
         let mechanism = catalogue.get(term.entry);
         let facts = mechanism.facts();
-        let filters = facts.filters && facts.stage >= FROM;
+        let filters = facts.filters && facts.stage >= ERROR_ENTERS;
         filters.then(|| mechanism.memory_s(&term.parameters, context))?
     };
     model.terms.iter().filter_map(own_s).sum()
@@ -400,7 +400,7 @@ pub fn integrated<T: Number>(
 mod tests {
     use super::*;
     use crate::innovations::hypothesis::{Guess, judge};
-    use crate::innovations::noise::{Slopes, parts};
+    use crate::innovations::noise::{BalanceParts, Slopes, parts};
     use crate::innovations::toy::{
         CRITICAL, EFFORT, Noise, PEAK, entry_of, entry_of_form, settled, stop, with_term,
     };
@@ -414,17 +414,19 @@ mod tests {
         (squares.iter().sum::<f64>() / squares.len() as f64).sqrt()
     }
 
+    /// Friction that comes and goes by this much, as one that is fitted to a law that is off.
+    fn let_fast_friction_be(parts: &mut [BalanceParts], std: f64) {
+        let mut sources = parts.iter_mut().flat_map(|own| &mut own.sources);
+        let fast = sources.find(|own| own.name == "friction, fast");
+        fast.unwrap().log_std = std.ln();
+    }
+
     #[test]
     fn what_the_reading_says_of_the_law_mends_the_law_and_brings_little_noise() {
         let mut data = stop(Noise::TYPICAL, 4);
         let exact = stop(Noise::NONE, 4);
-        // Friction that comes and goes, as one that is fitted to a law that is off.
         let mut parts = settled(&data).parts;
-        let fast = parts[0]
-            .sources
-            .iter_mut()
-            .find(|s| s.name == "friction, fast");
-        fast.unwrap().log_std = f64::ln(0.07);
+        let_fast_friction_be(&mut parts, 0.07);
         data.tell_law_error(&parts);
         let (series, truth) = (&data.series[0], &exact.series[0].drag);
         // The law is exact: what is brought in is the reading's noise.
@@ -470,11 +472,7 @@ mod tests {
         }
         let law = Model::of_law(PEAK, CRITICAL);
         let mut parts = parts(&data, &Slopes::new(&data, &law));
-        let fast = parts[0]
-            .sources
-            .iter_mut()
-            .find(|s| s.name == "friction, fast");
-        fast.unwrap().log_std = f64::ln(0.1);
+        let_fast_friction_be(&mut parts, 0.1);
         let mut delayed = law;
         delayed.terms.push(Term {
             entry: entry_of(&data, Id::ForceDelay),
