@@ -56,6 +56,30 @@ pub(crate) fn squares(data: &Data, model: &Model, readings: &[Vec<f64>]) -> Vec<
         .collect()
 }
 
+/// Sum of squares of what a model leaves of these readings, by run, each with a peak friction of its own: runs differ in it.
+pub(crate) fn squares_within_runs(data: &Data, model: &Model, readings: &[Vec<f64>]) -> Vec<f64> {
+    let runs = data.series.par_iter().enumerate();
+    let within = |(run, s): (usize, &Series)| {
+        let left = left_of(data, model, run, &readings[run]);
+        let slopes = (!left.is_empty()).then(|| tyre_slopes_in(data, model, run, &[0]));
+        let [of_peak] = slopes.as_deref().unwrap_or_default() else {
+            return s.tyre_square(&left);
+        };
+        let (mut xx, mut xe, mut ee) = (0.0, 0.0, 0.0);
+        for k in s.tyre.iter().flat_map(Clone::clone) {
+            let (x, e) = (of_peak[k], left[k]);
+            if (x + e).is_finite() {
+                xx += x * x;
+                xe += x * e;
+                ee += e * e;
+            }
+        }
+        // What nothing is left of is all rounding.
+        f64::max(ee - if xx > 0.0 { xe * xe / xx } else { 0.0 }, 1e-12 * ee)
+    };
+    runs.map(within).collect()
+}
+
 /// What a model leaves of these readings of the drag on one run, in N; empty where it is not recorded.
 fn left_of(data: &Data, model: &Model, run: usize, readings: &[f64]) -> Vec<f64> {
     let rows = tyre_row_of(data, model, run);
@@ -128,5 +152,39 @@ pub(crate) fn plain(rig: &Rig, series: &[Series]) -> Plain {
     Plain {
         model: Model::of_law(best.2, best.1.exp()),
         left: best.0,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use core::ops::Range;
+
+    use super::*;
+    use crate::innovations::toy::{CRITICAL, Noise, PEAK, stop};
+
+    #[test]
+    fn another_peak_friction_of_a_run_is_no_error_within_it() {
+        let data = stop(Noise::TYPICAL, 4);
+        let model = Model::of_law(PEAK, CRITICAL);
+        let s = &data.series[0];
+        let law: Vec<f64> = left_of(&data, &model, 0, &vec![0.0; s.len()])
+            .iter()
+            .map(|left| -left)
+            .collect();
+        let reading = |k: usize, beside: f64| 1.3 * law[k] + beside * (k as f64).cos();
+        let of = |beside: f64| {
+            vec![
+                (0..s.len())
+                    .map(|k| reading(k, beside))
+                    .collect::<Vec<f64>>(),
+            ]
+        };
+        let all = squares(&data, &model, &of(0.0))[0];
+        let within = |beside: f64| squares_within_runs(&data, &model, &of(beside))[0];
+        assert!(within(0.0) < 1e-9 * all, "{} {all}", within(0.0));
+        // What is beside it is left: half of 40 N squared a sample.
+        let count: usize = s.tyre.iter().map(Range::len).sum();
+        let share = within(40.0) / (800.0 * count as f64);
+        assert!((share - 1.0).abs() < 0.02, "{share}");
     }
 }

@@ -29,7 +29,8 @@ pub fn seen(data: &Data, candidates: &[Candidate], scores: &[Score], threshold: 
             let candidate = &candidates[score.candidate];
             let (id, entry) = (candidate.id?, candidate.entry?);
             let mechanism = data.catalogue.get(entry);
-            if mechanism.facts().counter_form {
+            // What excites a form of the fast force is mostly noise of the wheel's speed.
+            if mechanism.facts().counter_form || mechanism.facts().of_fast_force {
                 return None;
             }
             let Some(amplitude) = mechanism.facts().amplitude else {

@@ -76,6 +76,8 @@ pub struct Series {
     /// By how many N the law at the slip of `wheel` and `speed` and at `load` lies above the law at these channels' own
     /// readings, to first order; empty where they are the readings' own.
     pub beside_law: Vec<f64>,
+    /// What of the force by the law in N is faster than the smoother leaves of it: what excites a load cell that rings.
+    pub fast_force: Vec<f64>,
     /// Brake torque in N m that enters the wheel balance, where there is a brake column.
     pub torque: Option<Channel>,
     /// Distance run since the first sample in m, but in gaps that begin at a standstill.

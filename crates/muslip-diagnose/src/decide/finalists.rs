@@ -95,8 +95,8 @@ fn best_start<'a>(
     own.max_by(|a, b| at_start(a).total_cmp(&at_start(b)))
 }
 
-/// Best candidates of a screen but of the ids passed over: at most `count` ids, at most two forms of each, each form at
-/// its best start; and beside them the counter-forms of these ids, and what the noise of a run is like, whatever it gains:
+/// Best candidates of a screen but of the ids passed over: at most `count` ids, at most two forms of each, and two of the fast
+/// force, each form at its best start; and beside them the counter-forms of these ids, and what the noise of a run is like, whatever it gains:
 /// of that the screen, at one size of the noise, says nothing.
 fn best(
     data: &Data,
@@ -130,7 +130,13 @@ fn best(
         if !gains && !asked_for {
             continue;
         }
-        let of_id = |(c, _): &&(usize, Score)| candidates[*c].id == candidate.id;
+        let fast = |entry: Option<usize>| {
+            entry.is_some_and(|entry| data.catalogue.get(entry).facts().of_fast_force)
+        };
+        let of_id = |(c, _): &&(usize, Score)| {
+            let other = &candidates[*c];
+            other.id == candidate.id && fast(other.entry) == fast(candidate.entry)
+        };
         let tried = |(c, _): &(usize, Score)| candidates[*c].entry == candidate.entry;
         if out.iter().filter(of_id).count() >= 2 || out.iter().any(tried) {
             continue;

@@ -95,13 +95,19 @@ impl Question<'_> {
         if self.untold.by_turn || !trials.iter().any(could_be_told) {
             return;
         }
-        let by_clock = |t: &&Trial| memory_of(data, t).is_some_and(|kind| kind != Kind::Tyre);
+        // What is fast in the slip is no part of what a relaxation, or another memory, is made of.
+        let of_smooth = |entry: usize| !data.catalogue.get(entry).facts().of_fast_force;
+        let by_clock = |t: &&Trial| {
+            let smooth = t.mechanism().is_some_and(|(_, entry)| of_smooth(entry));
+            smooth && memory_of(data, t).is_some_and(|kind| kind != Kind::Tyre)
+        };
         let mut clocks: Vec<[f64; 2]> = trials.iter().filter(by_clock).map(gains_of).collect();
         if clocks.is_empty() {
             let all = clocks_of(data);
             let entries = data.catalogue.entries().iter().enumerate();
             let of_clocks = entries.filter(|(_, own)| all.contains(&own.id()));
-            let of_clocks: Vec<usize> = of_clocks.map(|(entry, _)| entry).collect();
+            let of_clocks = of_clocks.map(|(entry, _)| entry);
+            let of_clocks: Vec<usize> = of_clocks.filter(|entry| of_smooth(*entry)).collect();
             let tried = screen.trials_of(&of_clocks);
             let is_tried = |id: &Id| {
                 tried

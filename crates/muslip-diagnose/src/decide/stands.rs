@@ -2,15 +2,15 @@
 
 use super::trial::{Claim, Trial, worth_of};
 use crate::constants::{
-    AGREED_PREDICTED, CLEARLY_PREDICTED, DEPENDENCE_WORTH, FEWEST_RUNS_AGREED, INDIFFERENT_NATS,
-    LARGE_GAIN_AT_SENSORS, LARGE_GAIN_NOT_FED, LARGE_GAIN_OF_DEPENDENCE_AT_SENSORS,
-    LARGE_GAIN_OF_RING, LARGE_GAIN_ON_UNSEEN, LARGE_TO_WORTH, LARGELY_PREDICTED, LEAST_GAIN,
-    LEAST_GAIN_AT_SENSORS, LEAST_GAIN_OF_AGREED, LEAST_GAIN_OF_DEPENDENCE_AT_SENSORS,
-    LEAST_PREDICTED, LEAST_PREDICTED_BY_DEPENDENCE, LEAST_T, LEAST_T_AT_SENSORS,
-    LEAST_T_AT_SENSORS_NOT_FED, LEAST_T_NOT_FED, LEAST_T_OF_AGREED, LEAST_T_OF_DEPENDENCE,
-    LEAST_T_OF_DEPENDENCE_AT_SENSORS, LEAST_T_OF_LARGE, LEAST_T_OF_LIKELIER, LEAST_T_OF_PREDICTED,
-    LEAST_T_OF_SURE, LINED_UP_PREDICTED, LINED_UP_PREDICTED_BY_DEPENDENCE, PREDICTED_APART,
-    WEAK_NATS,
+    AGREED_PREDICTED, CLEARLY_PREDICTED, CLEARLY_WITHIN_RUNS, DEPENDENCE_WORTH, FEWEST_RUNS_AGREED,
+    INDIFFERENT_NATS, LARGE_GAIN_AT_SENSORS, LARGE_GAIN_NOT_FED,
+    LARGE_GAIN_OF_DEPENDENCE_AT_SENSORS, LARGE_GAIN_OF_RING, LARGE_GAIN_ON_UNSEEN, LARGE_TO_WORTH,
+    LARGELY_PREDICTED, LEAST_GAIN, LEAST_GAIN_AT_SENSORS, LEAST_GAIN_OF_AGREED,
+    LEAST_GAIN_OF_DEPENDENCE_AT_SENSORS, LEAST_PREDICTED, LEAST_PREDICTED_BY_DEPENDENCE, LEAST_T,
+    LEAST_T_AT_SENSORS, LEAST_T_AT_SENSORS_NOT_FED, LEAST_T_NOT_FED, LEAST_T_OF_AGREED,
+    LEAST_T_OF_DEPENDENCE, LEAST_T_OF_DEPENDENCE_AT_SENSORS, LEAST_T_OF_LARGE, LEAST_T_OF_LIKELIER,
+    LEAST_T_OF_PREDICTED, LEAST_T_OF_SURE, LINED_UP_PREDICTED, LINED_UP_PREDICTED_BY_DEPENDENCE,
+    PREDICTED_APART, WEAK_NATS, WITHIN_RUNS,
 };
 
 impl Trial {
@@ -148,7 +148,13 @@ fn is_seen(trial: &Trial) -> bool {
 fn hidden(trial: &Trial) -> bool {
     let indifferent = trial.gain > -trial.price - INDIFFERENT_NATS;
     let gains = trial.gain > 0.0 || (indifferent && trial.mechanism().is_some());
-    trial.first && gains && seen_at_sensors(trial)
+    trial.first && gains && seen_at_sensors(trial) && shows_within_runs(trial)
+}
+
+/// Whether a name predicts the drag better where each run has a peak friction of its own, or none is predicted by it: what does
+/// not is one of the runs' own differences.
+fn shows_within_runs(trial: &Trial) -> bool {
+    trial.mechanism().is_none() || trial.predicts_within > WITHIN_RUNS
 }
 
 /// Whether what unseen runs say is enough by itself: several, alike, of the drag, of what no measuring chain leaves, nor the
@@ -156,7 +162,8 @@ fn hidden(trial: &Trial) -> bool {
 fn unseen_runs_agree(trial: &Trial) -> bool {
     let alike = several_name(trial, LEAST_T_OF_AGREED) && trial.first;
     let gains = trial.gain > LEAST_GAIN_OF_AGREED;
-    alike && gains && lowers_drag_s_error(trial.predicts, AGREED_PREDICTED)
+    let predicts = lowers_drag_s_error(trial.predicts, AGREED_PREDICTED);
+    alike && gains && predicts && shows_within_runs(trial)
 }
 
 /// Whether several unseen runs gain by a name that no measuring chain leaves, with a larger t than this.
@@ -203,10 +210,16 @@ fn seen_at_sensors(trial: &Trial) -> bool {
     if trial.mechanism().is_some() {
         let large = sum > LARGE_GAIN_AT_SENSORS && t > LEAST_T_OF_LARGE;
         let plain = trial.gain > 0.0 && t > LEAST_T_AT_SENSORS_NOT_FED;
-        let alike = t > LEAST_T_AT_SENSORS || !trial.fed_by_chain && (large || plain);
+        let within = t > LEAST_T_OF_LARGE && clearly_within_runs(trial);
+        let alike = t > LEAST_T_AT_SENSORS || !trial.fed_by_chain && (large || plain || within);
         return sum > LEAST_GAIN_AT_SENSORS && (alike || lined_up(trial));
     }
     trial.predicts > LEAST_PREDICTED_BY_DEPENDENCE && dependence_at_sensors(trial)
+}
+
+/// Whether a name that does not remember predicts the drag clearly better within each run.
+fn clearly_within_runs(trial: &Trial) -> bool {
+    !trial.remembers && lowers_drag_s_error(trial.predicts_within, CLEARLY_WITHIN_RUNS)
 }
 
 /// Whether unseen runs gain by a free dependence at the sensors' noise.
@@ -601,6 +614,60 @@ mod tests {
             ..radius(4.0, -1.0)
         };
         assert!(!stands(&left));
+    }
+
+    #[test]
+    fn what_tells_only_the_runs_from_each_other_is_hidden_by_nothing() {
+        let data = stop(Noise::TYPICAL, 4);
+        let base = toy::settled(&data);
+        let trial = |id: Id, predicts_within: f64| Trial {
+            first: true,
+            at_sensors: (90.0, 5.0),
+            predicts_within,
+            ..of_name(&data, &base, id, 2.0, 3.6)
+        };
+        let load = |within: f64| trial(Id::LoadSensitivity, within);
+        assert!(stands(&load(0.06)) && !stands(&load(0.04)));
+        // Nor is it what runs agree on.
+        let agreed = |within: f64| Trial {
+            at_sensors: (2.0, 1.0),
+            ..load(within)
+        };
+        assert!(stands(&agreed(0.06)) && !stands(&agreed(0.04)));
+        // An inertia predicts no drag; what fitted noise leaves is seen by itself.
+        assert!(stands(&trial(Id::WheelInertia, f64::INFINITY)));
+        assert!(stands(&of_name(
+            &data,
+            &base,
+            Id::LoadSensitivity,
+            20.0,
+            3.6
+        )));
+    }
+
+    #[test]
+    fn what_each_run_shows_clearly_need_not_gain_alike_at_the_sensors_noise() {
+        let data = stop(Noise::TYPICAL, 4);
+        let base = toy::settled(&data);
+        let radius = |nats: f64, t: f64, predicts_within: f64| Trial {
+            gain: -2.0,
+            first: true,
+            at_sensors: (nats, t),
+            predicts_within,
+            ..of_name(&data, &base, Id::EffectiveRadius, 1.0, 0.4)
+        };
+        assert!(stands(&radius(30.0, 1.6, 0.2)));
+        let fed = Trial {
+            fed_by_chain: true,
+            ..radius(30.0, 1.6, 0.2)
+        };
+        let refused = [
+            fed,
+            radius(15.0, 1.6, 0.2),
+            radius(30.0, 1.4, 0.2),
+            radius(30.0, 1.6, 0.1),
+        ];
+        assert!(refused.iter().all(|trial| !stands(trial)));
     }
 
     #[test]

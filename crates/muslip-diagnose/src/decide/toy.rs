@@ -30,6 +30,7 @@ pub fn of_name(data: &Data, base: &Judged, id: Id, nats: f64, t: f64) -> Trial {
         readings: 1,
         size: f64::INFINITY,
         predicts: 0.2,
+        predicts_within: 0.2,
         unanimous: [false, false],
         without_best: [0.0, 0.0],
         judged: base.clone().without_columns(),

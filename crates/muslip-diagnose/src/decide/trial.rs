@@ -9,7 +9,7 @@ use crate::constants::{
 use crate::data::Data;
 use crate::innovations::dependence::Dependence;
 use crate::innovations::hypothesis::{Beside, Judged, Unseen};
-use crate::law::{closest, squares};
+use crate::law::{closest, squares, squares_within_runs};
 use crate::mechanism::{Balance, Id, Kind, Memory};
 use crate::model::Term;
 use crate::number::mean_and_std;
@@ -109,6 +109,8 @@ pub struct Trial {
     /// By how much the model with it predicts the drag better: minus the mean over runs of the logarithm of the mean
     /// square error over that without it. Infinite for what does not work through the force.
     pub predicts: f64,
+    /// The same where each run has a peak friction of its own: what runs differ by is no more of it.
+    pub predicts_within: f64,
     /// Whether no unseen run speaks against it, at the noise as fitted and at the sensors'.
     pub unanimous: [bool; 2],
     /// What all unseen runs gain but the one that gains most, in nats, at both.
@@ -221,8 +223,8 @@ pub struct Before<'a> {
     untold: Untold,
     /// What was taken up before gained at the sensors' noise, in nats.
     taken_up: f64,
-    /// Sum of squares of the drag that its best law leaves, by run.
-    squares: Vec<f64>,
+    /// Sum of squares of the drag that its best law leaves, by run, and where each run has a peak friction of its own.
+    squares: [Vec<f64>; 2],
     /// Its loss and its noise.
     beside: Beside,
     /// What it says of unseen runs where the noise is no larger than the sensors make plausible.
@@ -261,10 +263,10 @@ impl<'a> Before<'a> {
             own.fed_by_chain()
                 || term.is_some_and(|term| own.begins_with_recordings(&term.parameters))
         });
-        let predicts = if claim.works_through_force(data) {
+        let [predicts, predicts_within] = if claim.works_through_force(data) {
             self.predicted_better(&judged)
         } else {
-            f64::INFINITY
+            [f64::INFINITY; 2]
         };
         let own_gains = gains(&base.unseen, &judged.unseen, per_run);
         let gains_at_sensors = self.gains_at_sensors(&judged, per_run);
@@ -307,6 +309,7 @@ impl<'a> Before<'a> {
             outlasts_chain: remembered.is_none_or(|memory| memory.outlasts_chain),
             beside_chain: true,
             predicts,
+            predicts_within,
             readings,
             size,
             unanimous: [&own_gains, &gains_at_sensors].map(|gains| unanimous(gains)),
@@ -386,25 +389,27 @@ impl<'a> Before<'a> {
     }
 
     /// Minus the mean over runs of the logarithm of the mean square error of the drag by this model over that by the
-    /// one before.
-    fn predicted_better(&self, with: &Judged) -> f64 {
+    /// one before; and the same where each run has a peak friction of its own.
+    fn predicted_better(&self, with: &Judged) -> [f64; 2] {
         let after = squares_by_best_law(self.data, with);
-        let ratios: Vec<f64> = self
-            .squares
-            .iter()
-            .zip(after)
-            .map(|(before, after)| (before / after).ln())
-            .filter(|ratio| ratio.is_finite())
-            .collect();
-        ratios.iter().sum::<f64>() / ratios.len().max(1) as f64
+        core::array::from_fn(|i| {
+            let ratios: Vec<f64> = self.squares[i]
+                .iter()
+                .zip(&after[i])
+                .map(|(before, after)| (before / after).ln())
+                .filter(|ratio| ratio.is_finite())
+                .collect();
+            ratios.iter().sum::<f64>() / ratios.len().max(1) as f64
+        })
     }
 }
 
 /// Sum of squares of the drag that a model leaves, by run, with the law that predicts best and nothing of the chain's
-/// nuisances: those may stand for an effect.
-fn squares_by_best_law(data: &Data, judged: &Judged) -> Vec<f64> {
+/// nuisances: those may stand for an effect. And the same where each run has a peak friction of its own.
+fn squares_by_best_law(data: &Data, judged: &Judged) -> [Vec<f64>; 2] {
     let drags = judged.drag_to_explain(data);
-    squares(data, &closest(data, &judged.model, &drags), &drags)
+    let model = closest(data, &judged.model, &drags);
+    [squares, squares_within_runs].map(|of| of(data, &model, &drags))
 }
 
 /// Shortest memory in s that a recording shows. None is shorter than its step, or half of it where it is real: how a reading

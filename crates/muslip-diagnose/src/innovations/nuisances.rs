@@ -182,6 +182,15 @@ impl<'a> Chain<'a> {
         self.columns([Some(&|k| force[k] - mean[k]), None, None])
     }
 
+    /// What of the slip is faster than the smoother leaves of it: the drag follows as much of it as is no noise.
+    fn by_fast_force(&self) -> Triple {
+        let fast = &self.series.fast_force;
+        if fast.is_empty() {
+            return Triple::default();
+        }
+        self.columns_from(Stage::Slip, [Some(&|k| fast[k]), None, None])
+    }
+
     /// A mean over noisy slip is not the law at the mean slip: half its second derivative times the noise's variance.
     fn by_curvature(&self) -> Triple {
         let s = self.series;
@@ -328,6 +337,8 @@ pub fn nuisances(
         (3.0, chain.by_force(0.02)),
         // Force smoothed, 60 ms.
         (1.0, chain.by_force(0.06)),
+        // Force as fast as the smoother does not leave it.
+        (1.0, chain.by_fast_force()),
         // Brake smoothed, 6 ms.
         (4.0, chain.by_brake(0.006)),
         // Brake smoothed, 20 ms.
@@ -355,10 +366,14 @@ pub fn nuisances(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::innovations::blocks::blocks;
     use crate::innovations::hypothesis::{Beside, judge_added};
     use crate::innovations::rows::rows_of;
-    use crate::innovations::toy::{EFFORT, Lags, Noise, settled, stop, stop_with, with_term};
+    use crate::innovations::toy::{
+        EFFORT, Lags, Noise, entry_of_form, settled, stop, stop_with, with_term,
+    };
     use crate::mechanism::Id;
+    use crate::model::Term;
 
     /// What a lag of the brake gains in nats, no price taken off, and its time constant in s.
     fn brake_lag_in(lags: Lags) -> (f64, f64) {
@@ -383,6 +398,34 @@ mod tests {
         });
         assert!(gain > 30.0, "{gain} nats, {time_s} s");
         assert!((time_s - 0.02).abs() < 0.004, "{time_s} s");
+    }
+
+    #[test]
+    fn a_drag_that_follows_what_is_fast_in_the_slip_is_no_load_cell_that_rings() {
+        let mut data = stop(Noise::TYPICAL, 7);
+        let s = &mut data.series[0];
+        // Up to 40 Hz and beyond, as drum and brake excite the wheel; nothing lasts.
+        let swing = |t: f64| (150.0 * t).sin() + (233.0 * t).cos() + (311.0 * t + t * t).sin();
+        s.fast_force = s.time.iter().map(|t| 60.0 * swing(*t)).collect();
+        for k in 0..s.len() {
+            s.drag[k] += 0.7 * s.fast_force[k];
+        }
+        // The toy's wheel and vehicle did not feel it.
+        s.wheel_balance.clear();
+        s.vehicle_balance.clear();
+        data.blocks = blocks(&data.series);
+        let base = settled(&data);
+        let entry = entry_of_form(&data, Id::StructuralResonance, "fast_share");
+        let mut model = base.model.clone();
+        model.terms.push(Term {
+            entry,
+            parameters: vec![40.0, 0.2, 0.3],
+        });
+        let beside = Beside::new(&data, &base);
+        let with = judge_added(&data, &model, &[], &beside, EFFORT).unwrap();
+        let gain = base.loss - with.loss;
+        // Three parameters and a name cost fifteen.
+        assert!(gain < 12.0, "{gain} nats, {:?}", with.model.terms[0]);
     }
 
     #[test]

@@ -245,6 +245,9 @@ fn added_by_load_cell<T: Listed>(
 ) -> Option<Vec<T>> {
     let both = zip(&tyre.force, tyre.contact.as_ref()?);
     let mut added: Vec<T> = both.map(|(force, contact)| *force - *contact).collect();
+    for (added, fast) in added.iter_mut().zip(&tyre.read_of_fast) {
+        *added = *added - *fast;
+    }
     if let Some(entered) = &tyre.entered {
         let fast = added_to_fast(catalogue, model, p, series, context, entered);
         for (added, fast) in added.iter_mut().zip(fast) {

@@ -12,7 +12,7 @@ use super::hypothesis::Judged;
 use super::noise::{BalanceParts, Slopes};
 use crate::data::Data;
 use crate::mechanism::Balance;
-use crate::prepare::mean_twice_about;
+use crate::prepare::{BRISK_S, mean_twice_about};
 use crate::series::Series;
 
 /// Reach in s of the means of what the drag says of the slip.
@@ -46,6 +46,7 @@ pub fn reconciled(mut data: Data, base: &Judged) -> Data {
         // What a run's drag is off by throughout is no error of its slip.
         let of_run = parts.of_run(run, blocks.apart_s(), &blocks.mean(&left));
         let mut beside = vec![0.0; s.len()];
+        let fast = fast_force(s, &slopes.slip[run], radius, farthest_slip);
         for (block, samples) in blocks.samples.iter().enumerate() {
             let [of_slip, of_force] = parts.variances(run, block);
             for k in samples.clone() {
@@ -65,6 +66,7 @@ pub fn reconciled(mut data: Data, base: &Judged) -> Data {
                 }
             }
         }
+        s.fast_force = fast;
         let quiet = quiet_load(s);
         for k in s.tyre.iter().flat_map(Clone::clone) {
             let removed = s.load.smooth[k] - quiet[k];
@@ -77,6 +79,24 @@ pub fn reconciled(mut data: Data, base: &Judged) -> Data {
         s.beside_law = beside;
     }
     data
+}
+
+/// What of the force in N, of this slope in the slip, is faster than the smoother leaves of it, by the wheel's speed; no more
+/// than this slip makes.
+fn fast_force(s: &Series, per_slip: &[f64], radius: f64, farthest_slip: f64) -> Vec<f64> {
+    let wheel = &s.wheel;
+    // As many samples as lie within the reach, to the nearest.
+    let reach = BRISK_S + 0.5 * s.typical_dt;
+    let brisk = mean_twice_about(&s.time, &wheel.raw, &s.tyre, reach);
+    let mut fast = vec![0.0; s.len()];
+    for k in s.tyre.iter().flat_map(Clone::clone) {
+        let slip = (wheel.smooth[k] - brisk[k]) * radius / s.speed.smooth[k];
+        let force = per_slip[k] * slip.clamp(-farthest_slip, farthest_slip);
+        if force.is_finite() {
+            fast[k] = force;
+        }
+    }
+    fast
 }
 
 /// The load without what of its fast part is no more than its sensor's noise.
@@ -122,6 +142,30 @@ mod tests {
         // The sensors' own sizes: fitted ones may call the speeds' noise the drag's.
         base.parts = parts(data, &Slopes::new(data, &base.model));
         base
+    }
+
+    #[test]
+    fn what_is_fast_in_the_force_is_the_slope_times_what_smoothing_takes_off_the_slip() {
+        let mut data = stop(Noise::TYPICAL, 4);
+        let radius = data.context.radius;
+        let s = &mut data.series[0];
+        let per_slip = vec![4e4; s.len()];
+        // 25 Hz, of which a smoother leaves nothing; a mean over 3 ms on either side holds three steps of 5 ms.
+        let swing = |t: f64| 0.2 * (core::f64::consts::TAU * 25.0 * t).sin();
+        for k in 0..s.len() {
+            s.wheel.smooth[k] = 50.0;
+            s.wheel.raw[k] = 50.0 + swing(s.time[k]);
+        }
+        let left = (1.0 + 2.0 * (core::f64::consts::TAU * 25.0 * 5e-3).cos()) / 3.0;
+        let of = |farthest: f64| fast_force(s, &per_slip, radius, farthest);
+        let fast = of(1.0);
+        let own = s.tyre[0].clone();
+        let inside = fast.iter().enumerate().take(own.end - 2);
+        for (k, fast) in inside.skip(own.start + 2) {
+            let slip = -swing(s.time[k]) * radius / s.speed.smooth[k];
+            assert!((fast - 4e4 * left * left * slip).abs() < 1e-6, "{k}");
+        }
+        assert!(of(1e-4).iter().all(|force| force.abs() <= 4.0));
     }
 
     /// Root of the mean square of what is finite.

@@ -188,6 +188,9 @@ pub struct Facts {
     pub counter_form: bool,
     /// Whether it is a filter: linear in the force, or the slip, that passes it, and adds nothing of its own.
     pub filters: bool,
+    /// Whether what enters it has all that is fast in the slip, the wheel speed's noise too, and not only what the smoother
+    /// leaves.
+    pub of_fast_force: bool,
     /// Whether a measuring chain leaves what looks like it: kernels that differ, slip's noise that flattens the curve, the
     /// pitch of a ring.
     pub fed_by_chain: bool,
@@ -221,6 +224,7 @@ impl Facts {
             counter_form: false,
             scales_level: false,
             filters: false,
+            of_fast_force: false,
             fed_by_chain: false,
             like_noise_of_load: false,
             another_curve: false,

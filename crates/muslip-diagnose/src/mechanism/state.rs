@@ -84,6 +84,10 @@ pub struct State<T> {
     pub force: Vec<T>,
     /// Contact force as it was before the measuring chain (kept from stage `Contact`).
     pub contact: Option<Vec<T>>,
+    /// What of the force in N is faster than the smoother leaves of it, where filters are asked what they make of all of it.
+    pub fast_force: Vec<f64>,
+    /// What of the reading in N follows from that.
+    pub read_of_fast: Vec<T>,
     /// The force in N as it enters the filters between contact and reading, where there are such.
     pub entered: Option<Vec<T>>,
     /// Relative change of inertia (wheel) or mass (vehicle).
@@ -118,6 +122,8 @@ impl<T: Number> State<T> {
             friction: Vec::new(),
             force: Vec::new(),
             contact: None,
+            fast_force: Vec::new(),
+            read_of_fast: Vec::new(),
             entered: None,
             inertia_change: zero,
             gain_change: zero,
