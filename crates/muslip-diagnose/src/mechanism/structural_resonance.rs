@@ -181,7 +181,7 @@ impl<T: Number> Mechanism<T> for StructuralResonance {
 mod tests {
     use super::*;
 
-    /// What a form makes of no force of 1,200 N for a tenth of a second, in N, with what is fast beside it.
+    /// What a form makes of a constant force of 1,200 N in a tenth of a second, in N, with what is fast beside it.
     fn read(form: Form, fast: &[f64]) -> Vec<f64> {
         let series = Series {
             dt: vec![1e-3; 100],
