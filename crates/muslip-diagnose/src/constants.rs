@@ -27,7 +27,7 @@ pub const LEAST_T_OF_AGREED: f64 = 3.0;
 /// the most of what all runs show alike: six with a t of three are worth three nats, and a name costs seven.
 pub const LEAST_GAIN_OF_AGREED: f64 = -2.0;
 /// As [`LEAST_T_OF_AGREED`]: least logarithm by which the name lowers the mean square error of the drag.
-pub const AGREED_PREDICTED: f64 = PREDICTED_APART;
+pub const AGREED_PREDICTED: f64 = 0.1;
 /// As [`LEAST_T_OF_AGREED`], from which a name need not lower the mean square error of the drag by as much as others, only not
 /// enlarge it.
 pub const LEAST_T_OF_SURE: f64 = 5.0;

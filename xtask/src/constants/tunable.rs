@@ -68,11 +68,7 @@ impl Constant {
 pub fn write(folder: &Path) -> Result<Vec<Constant>> {
     let mut constants = Vec::new();
     for (file, table) in TABLES {
-        let file = root().join(ENGINE).join(file);
-        let text = fs::read_to_string(&file).with_context(|| file.display().to_string())?;
-        let found = found_in(&text, table);
-        ensure!(!found.is_empty(), "no constants in {}", file.display());
-        constants.extend(found);
+        constants.extend(of_table(file, table)?);
     }
     for file in output(command("git", &["ls-files", "-z"]))?.split_terminator('\0') {
         let to = folder.join(file);
@@ -86,6 +82,15 @@ pub fn write(folder: &Path) -> Result<Vec<Constant>> {
         write_new(&to, &bytes)?;
     }
     Ok(constants)
+}
+
+/// The scalar constants of a table of the engine.
+fn of_table(file: &str, table: &'static str) -> Result<Vec<Constant>> {
+    let file = root().join(ENGINE).join(file);
+    let text = fs::read_to_string(&file).with_context(|| file.display().to_string())?;
+    let found = found_in(&text, table).with_context(|| file.display().to_string())?;
+    ensure!(!found.is_empty(), "no constants in {}", file.display());
+    Ok(found)
 }
 
 /// A file of the engine with constants that can be set.
@@ -104,22 +109,28 @@ fn write_new(to: &Path, bytes: &[u8]) -> Result<()> {
     fs::write(to, bytes).with_context(|| to.display().to_string())
 }
 
-/// The scalar constants of a table: those with a literal for a value.
-fn found_in(text: &str, table: &'static str) -> Vec<Constant> {
-    text.lines()
-        .filter_map(|line| {
-            let (name, rest) = line.strip_prefix("pub const ")?.split_once(": ")?;
+/// The scalar constants in the text of a table. Each has a literal for a value: of one that is made of others the function would
+/// not compile.
+fn found_in(text: &str, table: &'static str) -> Result<Vec<Constant>> {
+    let mut found = Vec::new();
+    for line in text.lines() {
+        let scalar = line.strip_prefix("pub const ").and_then(|line| {
+            let (name, rest) = line.split_once(": ")?;
             let (kind, value) = rest.strip_suffix(';')?.split_once(" = ")?;
-            let scalar = matches!(kind, "f64" | "usize" | "isize");
-            let value = value.replace('_', "").parse().ok().filter(|_| scalar)?;
-            Some(Constant {
-                table,
-                name: name.to_owned(),
-                kind: kind.to_owned(),
-                value,
-            })
-        })
-        .collect()
+            matches!(kind, "f64" | "usize" | "isize").then_some((name, kind, value))
+        });
+        let Some((name, kind, value)) = scalar else {
+            continue;
+        };
+        let value = value.replace('_', "").parse();
+        found.push(Constant {
+            table,
+            name: name.to_owned(),
+            kind: kind.to_owned(),
+            value: value.with_context(|| format!("{name} has no literal for a value"))?,
+        });
+    }
+    Ok(found)
 }
 
 /// A table with functions in place of these constants.
@@ -231,13 +242,22 @@ mod tests {
 
     #[test]
     fn constants_with_a_literal_are_found_and_become_functions() {
-        let found = found_in(TABLE, "constants");
+        let found = found_in(TABLE, "constants").unwrap();
         let paths: Vec<String> = found.iter().map(Constant::path).collect();
         assert_eq!(paths, ["constants::STEPS", "constants::SHARE"]);
         let set = settable(TABLE, "constants", &found);
         assert!(set.contains("pub fn STEPS() -> usize"));
         assert!(set.contains("pub const RANGE: (f64, f64)"));
         assert!(!set.contains("pub const STEPS"));
+    }
+
+    #[test]
+    fn each_scalar_of_the_engine_s_tables_can_be_set() {
+        for (file, table) in TABLES {
+            of_table(file, table).unwrap();
+        }
+        let made_of_another = "pub const LEAST_T: f64 = 2.0;\npub const AGREED: f64 = LEAST_T;\n";
+        assert!(found_in(made_of_another, "constants").is_err());
     }
 
     #[test]
@@ -262,7 +282,7 @@ mod tests {
     #[test]
     fn only_what_a_file_imports_of_a_table_is_called() {
         let table = "pub const LEAST_T: f64 = 2.0;\npub const SHARE: f64 = 0.7;\n";
-        let constants = found_in(table, "constants");
+        let constants = found_in(table, "constants").unwrap();
         let text = "use crate::constants::{\n    LEAST_T, RANGE, SHARE,\n};\n// LEAST_T\nconst STEP_SHARE: f64 = 0.5;\nif t > LEAST_T * STEP_SHARE && SHARES > SHARE && RANGE.0 < 1.0 {}\n";
         let all = calling(text, &constants);
         assert!(all.ends_with(
