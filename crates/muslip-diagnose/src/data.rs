@@ -62,6 +62,11 @@ impl Catalogue {
     pub fn get(&self, index: usize) -> &dyn Mechanism<f64> {
         self.plain[index].as_ref()
     }
+    /// Whether what enters an entry has all that is fast in the slip.
+    #[must_use]
+    pub fn is_of_fast_force(&self, index: usize) -> bool {
+        self.get(index).facts().of_fast_force
+    }
 }
 
 /// Numbers for which the catalogue is at hand.

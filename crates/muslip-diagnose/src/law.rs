@@ -56,28 +56,39 @@ pub(crate) fn squares(data: &Data, model: &Model, readings: &[Vec<f64>]) -> Vec<
         .collect()
 }
 
-/// Sum of squares of what a model leaves of these readings, by run, each with a peak friction of its own: runs differ in it.
-pub(crate) fn squares_within_runs(data: &Data, model: &Model, readings: &[Vec<f64>]) -> Vec<f64> {
+/// The same, and where each run has a peak friction of its own: runs differ in it.
+pub(crate) fn squares_and_within_runs(
+    data: &Data,
+    model: &Model,
+    readings: &[Vec<f64>],
+) -> [Vec<f64>; 2] {
     let runs = data.series.par_iter().enumerate();
-    let within = |(run, s): (usize, &Series)| {
+    let of_run = |(run, s): (usize, &Series)| {
         let left = left_of(data, model, run, &readings[run]);
         let slopes = (!left.is_empty()).then(|| tyre_slopes_in(data, model, run, &[0]));
-        let [of_peak] = slopes.as_deref().unwrap_or_default() else {
-            return s.tyre_square(&left);
-        };
-        let (mut xx, mut xe, mut ee) = (0.0, 0.0, 0.0);
-        for k in s.tyre.iter().flat_map(Clone::clone) {
-            let (x, e) = (of_peak[k], left[k]);
-            if (x + e).is_finite() {
-                xx += x * x;
-                xe += x * e;
-                ee += e * e;
-            }
+        let all = s.tyre_square(&left);
+        match slopes.as_deref() {
+            Some([of_peak]) => (all, square_beside(s, of_peak, &left)),
+            _ => (all, all),
         }
-        // What nothing is left of is all rounding.
-        f64::max(ee - if xx > 0.0 { xe * xe / xx } else { 0.0 }, 1e-12 * ee)
     };
-    runs.map(within).collect()
+    let (all, within): (Vec<f64>, Vec<f64>) = runs.map(of_run).unzip();
+    [all, within]
+}
+
+/// Sum of squares of what the best multiple of a column leaves of a row, over the usable samples of the tyre's balance.
+fn square_beside(s: &Series, column: &[f64], left: &[f64]) -> f64 {
+    let (mut xx, mut xe, mut ee) = (0.0, 0.0, 0.0);
+    for k in s.tyre.iter().flat_map(Clone::clone) {
+        let (x, e) = (column[k], left[k]);
+        if (x + e).is_finite() {
+            xx += x * x;
+            xe += x * e;
+            ee += e * e;
+        }
+    }
+    // What nothing is left of is all rounding.
+    f64::max(ee - if xx > 0.0 { xe * xe / xx } else { 0.0 }, 1e-12 * ee)
 }
 
 /// What a model leaves of these readings of the drag on one run, in N; empty where it is not recorded.
@@ -180,7 +191,9 @@ mod tests {
             ]
         };
         let all = squares(&data, &model, &of(0.0))[0];
-        let within = |beside: f64| squares_within_runs(&data, &model, &of(beside))[0];
+        let both = squares_and_within_runs(&data, &model, &of(0.0));
+        assert!((both[0][0] / all - 1.0).abs() < 1e-12);
+        let within = |beside: f64| squares_and_within_runs(&data, &model, &of(beside))[1][0];
         assert!(within(0.0) < 1e-9 * all, "{} {all}", within(0.0));
         // What is beside it is left: half of 40 N squared a sample.
         let count: usize = s.tyre.iter().map(Range::len).sum();

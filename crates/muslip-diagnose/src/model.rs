@@ -254,8 +254,7 @@ pub fn tyre<T: Listed>(
         if terms.iter().any(filters) {
             state.entered = Some(state.force.clone());
         }
-        let of_fast = |(entry, _): &(usize, &[T])| catalogue.get(*entry).facts().of_fast_force;
-        if terms.iter().any(of_fast) {
+        if terms.iter().any(|(e, _)| catalogue.is_of_fast_force(*e)) {
             state.fast_force.clone_from(&series.fast_force);
         }
         for stage in [Stage::Structure, Stage::Filter, Stage::Line, Stage::Input] {

@@ -130,9 +130,7 @@ fn best(
         if !gains && !asked_for {
             continue;
         }
-        let fast = |entry: Option<usize>| {
-            entry.is_some_and(|entry| data.catalogue.get(entry).facts().of_fast_force)
-        };
+        let fast = |entry: Option<usize>| entry.is_some_and(|e| data.catalogue.is_of_fast_force(e));
         let of_id = |(c, _): &&(usize, Score)| {
             let other = &candidates[*c];
             other.id == candidate.id && fast(other.entry) == fast(candidate.entry)

@@ -7,6 +7,7 @@ mod next;
 mod rank;
 mod refuted;
 mod round;
+mod seen;
 mod settled;
 mod stands;
 #[cfg(test)]
@@ -20,8 +21,9 @@ pub use rank::softness;
 use refuted::refuted;
 pub use round::Asked;
 use round::Question;
+pub use seen::{few_reach, gains_beyond_chain};
 use settled::{again, at_noise_of, settled, under_own_noise};
-pub use stands::{could_stand, few_reach, gains_beyond_chain, rivals};
+pub use stands::{could_stand, rivals};
 use stands::{needed, stands};
 use trial::Before;
 pub use trial::{Claim, Trial};

@@ -96,7 +96,7 @@ impl Question<'_> {
             return;
         }
         // What is fast in the slip is no part of what a relaxation, or another memory, is made of.
-        let of_smooth = |entry: usize| !data.catalogue.get(entry).facts().of_fast_force;
+        let of_smooth = |entry: usize| !data.catalogue.is_of_fast_force(entry);
         let by_clock = |t: &&Trial| {
             let smooth = t.mechanism().is_some_and(|(_, entry)| of_smooth(entry));
             smooth && memory_of(data, t).is_some_and(|kind| kind != Kind::Tyre)

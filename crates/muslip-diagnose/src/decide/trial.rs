@@ -9,7 +9,7 @@ use crate::constants::{
 use crate::data::Data;
 use crate::innovations::dependence::Dependence;
 use crate::innovations::hypothesis::{Beside, Judged, Unseen};
-use crate::law::{closest, squares, squares_within_runs};
+use crate::law::{closest, squares_and_within_runs};
 use crate::mechanism::{Balance, Id, Kind, Memory};
 use crate::model::Term;
 use crate::number::mean_and_std;
@@ -409,7 +409,7 @@ impl<'a> Before<'a> {
 fn squares_by_best_law(data: &Data, judged: &Judged) -> [Vec<f64>; 2] {
     let drags = judged.drag_to_explain(data);
     let model = closest(data, &judged.model, &drags);
-    [squares, squares_within_runs].map(|of| of(data, &model, &drags))
+    squares_and_within_runs(data, &model, &drags)
 }
 
 /// Shortest memory in s that a recording shows. None is shorter than its step, or half of it where it is real: how a reading
