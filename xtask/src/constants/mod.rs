@@ -1,17 +1,28 @@
 //! `cargo xtask constants`: each constant by which the diagnosis decides, halved and doubled, on the same campaigns.
 
+#[cfg_attr(
+    not(test),
+    allow(dead_code, reason = "its text goes into the changed engine")
+)]
+#[allow(
+    clippy::expect_used,
+    reason = "what cannot be told there must not pass for nothing"
+)]
+mod kept;
 mod moved;
 mod tunable;
 
+use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, Result, ensure};
+use anyhow::{Context, Result, bail, ensure};
 
 use crate::step::{cargo, command, program, program_in, root, run, target};
 use crate::trial::clean_commit;
+use kept::{SET, TOLD, WORDS};
 use moved::{Answers, Moved};
-use tunable::{Constant, TUNED};
+use tunable::Constant;
 
 /// The page.
 const PAGE: &str = "docs/trials/constants.md";
@@ -49,12 +60,19 @@ impl Study {
             campaigns: folder.join(format!("campaigns-{}-{}", self.seed, self.count)),
         };
         self.generate(&bench.campaigns)?;
-        let as_it_is = bench.answers(None)?;
+        let as_it_is = bench.as_it_is()?;
         let mut rows = Vec::new();
         for constant in constants.iter().filter(|constant| self.wants(constant)) {
-            let [halved, doubled] = constant.varied().map(|value| -> Result<Moved> {
-                Ok(as_it_is.moved(&bench.answers(Some((constant, value)))?))
+            let moved = |at: usize| -> Result<Moved> {
+                Ok(as_it_is.moved(&bench.varied(&as_it_is, constant, at)?))
+            };
+            // Side by side: what is left to diagnose of most constants would keep one processor.
+            let both = std::thread::scope(|scope| {
+                let doubled = scope.spawn(|| moved(1));
+                [Ok(moved(0)), doubled.join()]
             });
+            let [halved, doubled] =
+                both.map(|joined| joined.unwrap_or_else(|_| bail!("a thread panicked")));
             let row = moved::row(constant, [&halved?, &doubled?]);
             println!("{row}");
             rows.push(row);
@@ -138,33 +156,81 @@ struct Bench {
 }
 
 impl Bench {
-    /// All campaigns diagnosed with one constant set to a value, or with all of them as they are. Answers that are there
-    /// already are not asked for again.
-    fn answers(&self, set: Option<(&Constant, f64)>) -> Result<Answers> {
-        let (name, setting) = match set {
-            None => ("as-it-is".to_owned(), String::new()),
-            Some((constant, value)) => {
-                let setting = format!("{}={value:e}", constant.path());
-                (setting.replace("::", "-"), setting)
-            }
-        };
-        let answers = self.campaigns.join("answers");
-        let results = answers.join(&name);
-        let judged = answers.join(format!("{name}.json"));
+    /// All campaigns diagnosed with the constants as they are, and what those tell of other values.
+    fn as_it_is(&self) -> Result<Answers> {
+        let told = self.answers().join("told");
+        let judged = self.answers().join("as-it-is.json");
         if !judged.exists() {
-            let part = answers.join(format!("{name}.part"));
-            let mut score = command(&judge(), &["score", "--terse", "--reuse"]);
-            score.args(["--muslip", &self.tunable]);
-            score.arg("--campaigns").arg(&self.campaigns);
-            score.arg("--results").arg(&results);
-            score.arg("--out").arg(&part);
-            score.env(TUNED, &setting);
-            score.stdout(std::process::Stdio::null());
-            run(&name, score)?;
-            fs::rename(&part, &judged)?;
-            // Only what is judged of them is of use, and it is a hundredth of them.
-            fs::remove_dir_all(&results)?;
+            // What a run that was stopped has told may be a part of it.
+            if told.exists() {
+                fs::remove_dir_all(&told)?;
+            }
+            fs::create_dir_all(&told)?;
+            self.judge(&judged, |score| score.env(TOLD, &told))?;
         }
         Answers::read(&judged)
+    }
+
+    /// The same with one constant halved or doubled. Only campaigns in which that may change something are diagnosed, and
+    /// answers that are there already are not asked for again.
+    fn varied(&self, as_it_is: &Answers, constant: &Constant, at: usize) -> Result<Answers> {
+        let touched = self.touched(constant, at)?;
+        if touched.is_empty() {
+            return Ok(as_it_is.clone());
+        }
+        let setting = format!("{}={:e}", constant.path(), constant.varied()[at]);
+        let judged = self.answers().join(setting.replace("::", "-") + ".json");
+        if !judged.exists() {
+            let only: Vec<&str> = touched.iter().map(String::as_str).collect();
+            self.judge(&judged, |score| {
+                score.args(["--jobs", "1", "--only", &only.join("|")]);
+                score.env(SET, &setting)
+            })?;
+        }
+        Ok(as_it_is.with(Answers::read(&judged)?))
+    }
+
+    /// Campaigns in which another value of a constant may change something.
+    fn touched(&self, constant: &Constant, at: usize) -> Result<BTreeSet<String>> {
+        let mut touched = BTreeSet::new();
+        for file in fs::read_dir(self.answers().join("told"))? {
+            let file = file?;
+            let text = fs::read_to_string(file.path())?;
+            let path = constant.path();
+            let mut told = text.lines().filter_map(|line| line.split_once(' '));
+            if told.any(|(of, word)| of == path && (word == WORDS[at] || word == WORDS[2])) {
+                touched.insert(file.file_name().to_string_lossy().into_owned());
+            }
+        }
+        Ok(touched)
+    }
+
+    fn answers(&self) -> PathBuf {
+        self.campaigns.join("answers")
+    }
+
+    /// Campaigns diagnosed and judged, into a file that is there when it is whole.
+    fn judge(
+        &self,
+        judged: &Path,
+        with: impl FnOnce(&mut std::process::Command) -> &mut std::process::Command,
+    ) -> Result<()> {
+        let (results, part) = (
+            judged.with_extension("results"),
+            judged.with_extension("part"),
+        );
+        let mut score = command(&judge(), &["score", "--terse", "--reuse"]);
+        score.args(["--muslip", &self.tunable]);
+        score.arg("--campaigns").arg(&self.campaigns);
+        score.arg("--results").arg(&results);
+        score.arg("--out").arg(&part);
+        with(&mut score);
+        score.stdout(std::process::Stdio::null());
+        let name = judged.file_stem().unwrap_or_default();
+        run(&name.to_string_lossy(), score)?;
+        fs::rename(&part, judged)?;
+        // Only what is judged of them is of use, and it is a hundredth of them.
+        fs::remove_dir_all(&results)?;
+        Ok(())
     }
 }

@@ -44,10 +44,16 @@ const FIGURES: [&str; 6] = [
     "unseen runs: repaired worse than base by 1 %",
 ];
 
-/// Judged answers to the same campaigns.
-pub struct Answers {
-    /// Names by campaign, first first.
-    names: BTreeMap<String, Vec<String>>,
+/// Judged answers to campaigns, by campaign.
+#[derive(Clone)]
+pub struct Answers(BTreeMap<String, Answer>);
+
+/// A judged answer.
+#[derive(Clone, Default)]
+struct Answer {
+    /// Names, first first.
+    names: Vec<String>,
+    /// What it counts in the figures.
     figures: [Share; FIGURES.len()],
 }
 
@@ -65,27 +71,57 @@ impl Answers {
         let of = || file.display().to_string();
         let cases: Vec<Value> =
             serde_json::from_str(&fs::read_to_string(file).with_context(of)?).with_context(of)?;
-        let mut all = Self {
-            names: BTreeMap::new(),
-            figures: Default::default(),
-        };
-        for case in &cases {
-            all.add(case).with_context(of)?;
-        }
-        Ok(all)
+        let answers = cases.iter().map(Answer::of);
+        answers.collect::<Result<_>>().with_context(of).map(Self)
     }
 
-    /// Adds one judged campaign.
-    fn add(&mut self, case: &Value) -> Result<()> {
+    /// These with others in place of their own.
+    pub fn with(&self, others: Self) -> Self {
+        let mut all = self.clone();
+        all.0.extend(others.0);
+        all
+    }
+
+    /// All that they count in a figure.
+    fn figure(&self, at: usize) -> Share {
+        let of = self.0.values().map(|answer| answer.figures[at]);
+        of.fold(Share::default(), |sum, own| Share {
+            hits: sum.hits + own.hits,
+            of: sum.of + own.of,
+        })
+    }
+
+    /// What other answers to the same campaigns move.
+    pub fn moved(&self, others: &Self) -> Moved {
+        let other = |(campaign, own): &(&String, &Answer)| {
+            others
+                .0
+                .get(*campaign)
+                .is_none_or(|other| other.names != own.names)
+        };
+        let points = |at: usize| others.figure(at).percent() - self.figure(at).percent();
+        let figures = (0..FIGURES.len()).map(|at| (at, points(at)));
+        Moved {
+            names: self.0.iter().filter(other).count(),
+            figures: figures
+                .filter(|(_, points)| points.abs() > POINTS)
+                .collect(),
+        }
+    }
+}
+
+impl Answer {
+    /// Of one judged campaign, with its name.
+    fn of(case: &Value) -> Result<(String, Self)> {
+        let mut own = Self::default();
         let flag = |name: &str| case[name].as_bool().with_context(|| name.to_owned());
         let list = |name: &str| case[name].as_array().with_context(|| name.to_owned());
         let text =
             |value: &Value| Ok::<_, anyhow::Error>(value.as_str().context("a text")?.to_owned());
         let named = list("named")?;
         let ids = named.iter().map(|name| text(&name["id"]));
-        self.names
-            .insert(text(&case["campaign"])?, ids.collect::<Result<_>>()?);
-        let [null, told, ideal, chains, sure, worse] = &mut self.figures;
+        own.names = ids.collect::<Result<_>>()?;
+        let [null, told, ideal, chains, sure, worse] = &mut own.figures;
         match text(&case["stratum"])?.as_str() {
             "null" => null.add(flag("false_physics")?),
             "chain" => told.add(case["finding"]["right"].as_bool().context("finding")?),
@@ -107,21 +143,7 @@ impl Answers {
         for gain in list("gains")? {
             worse.add(gain["worse"].as_bool().context("worse")?);
         }
-        Ok(())
-    }
-
-    /// What other answers to the same campaigns move.
-    pub fn moved(&self, others: &Self) -> Moved {
-        let other =
-            |(campaign, names): &(&String, &Vec<String>)| others.names[*campaign] != **names;
-        let points = |at: usize| others.figures[at].percent() - self.figures[at].percent();
-        let figures = (0..FIGURES.len()).map(|at| (at, points(at)));
-        Moved {
-            names: self.names.iter().filter(other).count(),
-            figures: figures
-                .filter(|(_, points)| points.abs() > POINTS)
-                .collect(),
-        }
+        Ok((text(&case["campaign"])?, own))
     }
 }
 
@@ -150,12 +172,12 @@ pub fn row(constant: &Constant, [halved, doubled]: [&Moved; 2]) -> String {
 
 /// The page.
 pub fn page(command: &str, commit: &str, as_it_is: &Answers, rows: &[String]) -> String {
-    let campaigns = as_it_is.names.len();
+    let campaigns = as_it_is.0.len();
     let figures: String = FIGURES
         .iter()
-        .zip(as_it_is.figures)
         .enumerate()
-        .map(|(at, (what, share))| {
+        .map(|(at, what)| {
+            let share = as_it_is.figure(at);
             format!(
                 "| {} | {what} | {} of {} | {:.1} |\n",
                 at + 1,
@@ -187,10 +209,6 @@ mod tests {
     use serde_json::json;
 
     fn answers(first: &str, right: bool) -> Answers {
-        let mut all = Answers {
-            names: BTreeMap::new(),
-            figures: Default::default(),
-        };
         let case = |campaign: &str, stratum: &str, id: &str, right: bool| {
             json!({
                 "campaign": campaign, "stratum": stratum, "real_chain": true, "of_the_chain": false,
@@ -199,9 +217,11 @@ mod tests {
                 "gains": [{"worse": false}, {"worse": !right}],
             })
         };
-        all.add(&case("0", "single", first, right)).unwrap();
-        all.add(&case("1", "null", "force_gain", false)).unwrap();
-        all
+        let cases = [
+            case("0", "single", first, right),
+            case("1", "null", "force_gain", false),
+        ];
+        Answers(cases.iter().map(|case| Answer::of(case).unwrap()).collect())
     }
 
     #[test]

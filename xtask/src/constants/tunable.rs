@@ -1,9 +1,10 @@
 //! The engine's sources with constants that can be set from outside.
 //!
-//! What users run has no such thing: a copy of the workspace is changed. Each scalar constant of the two tables becomes a
-//! function of the same name that reads [`TUNED`] once, and is called where the constant stood.
+//! What users run has no such thing: a copy of the workspace is changed. Each scalar constant of the two tables becomes one
+//! that is [kept](super::kept): where it stands by itself on one side of a comparison that is said, so that the constant can
+//! tell whether another value of it would have changed anything.
 
-use std::collections::BTreeSet;
+use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
 
@@ -11,8 +12,8 @@ use anyhow::{Context, Result, ensure};
 
 use crate::step::{command, output, root};
 
-/// Environment variable that sets one constant: `path=value`.
-pub const TUNED: &str = "MUSLIP_CONSTANT";
+/// What a constant becomes.
+const KEPT: &str = include_str!("kept.rs");
 
 /// The engine's sources, ...
 const ENGINE: &str = "crates/muslip-diagnose/src";
@@ -133,7 +134,7 @@ fn found_in(text: &str, table: &'static str) -> Result<Vec<Constant>> {
     Ok(found)
 }
 
-/// A table with functions in place of these constants.
+/// A table with functions in place of these constants, and in the first of them what they are made of.
 fn settable(text: &str, table: &str, constants: &[Constant]) -> String {
     let of_line = |line: &str| {
         let named = |c: &&Constant| {
@@ -144,48 +145,58 @@ fn settable(text: &str, table: &str, constants: &[Constant]) -> String {
     let mut all = String::new();
     for line in text.lines() {
         match of_line(line) {
-            Some(constant) => all.push_str(&function(constant)),
+            Some(constant) => all.push_str(&functions(constant)),
             None => all.push_str(line),
         }
         all.push('\n');
     }
+    if table == TABLES[0].1 {
+        all.push_str(&format!("/// Kept constants.\npub mod kept {{\n{KEPT}}}\n"));
+    }
     all
 }
 
-fn function(constant: &Constant) -> String {
+/// The functions of a constant, by its name: its value, and what is compared with it.
+fn functions(constant: &Constant) -> String {
     let Constant {
         name, kind, value, ..
     } = constant;
     let path = constant.path();
+    let [low, high] = constant.varied();
     format!(
-        r#"#[allow(non_snake_case, clippy::all, clippy::pedantic)]
-#[must_use]
+        r#"#[must_use]
+#[allow(non_snake_case, clippy::all, clippy::pedantic)]
 pub fn {name}() -> {kind} {{
-    static VALUE: std::sync::LazyLock<{kind}> = std::sync::LazyLock::new(|| {{
-        let set = std::env::var("{TUNED}").unwrap_or_default();
-        match set.strip_prefix("{path}=") {{
-            Some(value) => value.parse::<f64>().expect("a number") as {kind},
-            None => {value:?} as {kind},
-        }}
+    {name}_compared().0.taken()
+}}
+/// The same, compared.
+#[must_use]
+#[allow(non_snake_case, clippy::all, clippy::pedantic)]
+pub fn {name}_compared() -> crate::constants::kept::Compared<{kind}> {{
+    use crate::constants::kept::{{Compared, Kept}};
+    static KEPT: std::sync::LazyLock<Kept<{kind}>> = std::sync::LazyLock::new(|| {{
+        let varied = [{low:?} as {kind}, {high:?} as {kind}];
+        Kept::new("{path}", {value:?} as {kind}, varied, |value| value as {kind})
     }});
-    *VALUE
+    Compared(&KEPT)
 }}"#
     )
 }
 
 /// Sources that call what they import of a table.
 fn calling(text: &str, constants: &[Constant]) -> String {
-    let mut imported = imported(text);
-    imported.retain(|name| constants.iter().any(|c| c.name == *name));
+    let imported = imported(text, constants);
     let mut all = String::new();
     let mut importing = false;
-    for line in text.lines() {
+    let mut lines = text.lines().peekable();
+    while let Some(line) = lines.next() {
         let code = line.trim_start();
         importing |= is_import(code);
         if importing || code.starts_with("//") {
             all.push_str(line);
         } else {
-            all.push_str(&called(line, &imported));
+            let next = lines.peek().map_or("", |next| next.trim_start());
+            all.push_str(&called(line, next, &imported));
         }
         importing &= !code.ends_with(';');
         all.push('\n');
@@ -197,17 +208,17 @@ fn is_import(code: &str) -> bool {
     code.starts_with("use ") || code.starts_with("pub use ")
 }
 
-/// Names that a file imports of a table.
-fn imported(text: &str) -> BTreeSet<&str> {
-    let mut names = BTreeSet::new();
+/// Constants that a file imports of a table, by name.
+fn imported<'a>(text: &'a str, constants: &'a [Constant]) -> BTreeMap<&'a str, &'a Constant> {
+    let mut names = BTreeMap::new();
     for statement in text.split(';') {
         let import = statement.rfind("use ").map(|at| &statement[at..]);
-        let of_table = import.and_then(|import| import.split_once("constants::"));
-        if let Some((_, list)) = of_table {
-            names.extend(
-                list.split(|c: char| !is_of_name(c))
-                    .filter(|n| !n.is_empty()),
-            );
+        let Some((_, list)) = import.and_then(|import| import.split_once("constants::")) else {
+            continue;
+        };
+        for name in list.split(|c: char| !is_of_name(c)) {
+            let constant = constants.iter().find(|c| c.name == name);
+            names.extend(constant.map(|constant| (name, constant)));
         }
     }
     names
@@ -217,21 +228,53 @@ fn is_of_name(c: char) -> bool {
     c.is_ascii_alphanumeric() || c == '_'
 }
 
-/// A line that calls these names.
-fn called(line: &str, names: &BTreeSet<&str>) -> String {
+/// A line that calls these constants; with the line that comes after it.
+fn called(line: &str, next: &str, constants: &BTreeMap<&str, &Constant>) -> String {
     let mut all = String::new();
     let mut rest = line;
     while let Some(start) = rest.find(is_of_name) {
         let name = &rest[start..];
         let end = name.find(|c| !is_of_name(c)).unwrap_or(name.len());
-        all.push_str(&rest[..start + end]);
-        if names.contains(&name[..end]) {
-            all.push_str("()");
+        let before = line[..line.len() - name.len()].trim_end();
+        let after = match name[end..].trim_start() {
+            "" => next,
+            after => after,
+        };
+        all.push_str(&rest[..start]);
+        match constants.get(&name[..end]) {
+            Some(constant) if is_compared(before, after) => {
+                let (table, name) = (constant.table, &constant.name);
+                all.push_str(&format!("crate::{table}::{name}_compared()"));
+            }
+            Some(constant) => all.push_str(&format!("{}()", constant.name)),
+            None => all.push_str(&name[..end]),
         }
         rest = &name[end..];
     }
     all.push_str(rest);
     all
+}
+
+/// Whether what stands between these is one side of a comparison, all of it. Where it cannot be told it is not.
+fn is_compared(before: &str, after: &str) -> bool {
+    let orders = ["<", ">", "<=", ">="];
+    let ends = |text: &str, with: &[&str]| with.iter().any(|end| text.ends_with(end));
+    let starts = |text: &str, with: &[&str]| with.iter().any(|start| text.starts_with(start));
+    let on_the_right = ends(
+        before,
+        &orders
+            .map(|order| format!(" {order}"))
+            .each_ref()
+            .map(String::as_str),
+    ) && starts(after, &[")", ",", ";", "&&", "||", "{", "}", "=>"]);
+    let on_the_left = starts(
+        after,
+        &orders
+            .map(|order| format!("{order} "))
+            .each_ref()
+            .map(String::as_str),
+    ) && ends(before, &["(", "{", "&&", "||", " =", ",", ";", "|"]);
+    on_the_right || on_the_left
 }
 
 #[cfg(test)]
@@ -247,6 +290,8 @@ mod tests {
         assert_eq!(paths, ["constants::STEPS", "constants::SHARE"]);
         let set = settable(TABLE, "constants", &found);
         assert!(set.contains("pub fn STEPS() -> usize"));
+        assert!(set.contains("let varied = [3000.0 as usize, 12000.0 as usize];"));
+        assert!(set.contains("pub mod kept {"));
         assert!(set.contains("pub const RANGE: (f64, f64)"));
         assert!(!set.contains("pub const STEPS"));
     }
@@ -283,11 +328,40 @@ mod tests {
     fn only_what_a_file_imports_of_a_table_is_called() {
         let table = "pub const LEAST_T: f64 = 2.0;\npub const SHARE: f64 = 0.7;\n";
         let constants = found_in(table, "constants").unwrap();
-        let text = "use crate::constants::{\n    LEAST_T, RANGE, SHARE,\n};\n// LEAST_T\nconst STEP_SHARE: f64 = 0.5;\nif t > LEAST_T * STEP_SHARE && SHARES > SHARE && RANGE.0 < 1.0 {}\n";
+        let text = "use crate::constants::{\n    LEAST_T, RANGE, SHARE,\n};\n// LEAST_T\nconst STEP_SHARE: f64 = 0.5;\nlet t = LEAST_T * STEP_SHARE + SHARES + SHARE + RANGE.0;\n";
         let all = calling(text, &constants);
         assert!(all.ends_with(
-            "// LEAST_T\nconst STEP_SHARE: f64 = 0.5;\nif t > LEAST_T() * STEP_SHARE && SHARES > SHARE() && RANGE.0 < 1.0 {}\n"
+            "// LEAST_T\nconst STEP_SHARE: f64 = 0.5;\nlet t = LEAST_T() * STEP_SHARE + SHARES + SHARE() + RANGE.0;\n"
         ));
         assert!(all.starts_with("use crate::constants::{\n    LEAST_T, RANGE, SHARE,\n};\n"));
+    }
+
+    #[test]
+    fn what_is_all_of_one_side_of_a_comparison_is_compared() {
+        let constants = found_in("pub const LEAST_T: f64 = 2.0;\n", "audit::constants").unwrap();
+        let is = |code: &str| {
+            let text = format!("use super::constants::LEAST_T;\n{code}\n");
+            calling(&text, &constants).contains("crate::audit::constants::LEAST_T_compared()")
+        };
+        for code in [
+            "if t > LEAST_T && u {",
+            "(t >= LEAST_T).then(f)",
+            "a > 0.0\n    && t < LEAST_T\n    && b",
+            "let seen = LEAST_T <= t;",
+            "all.filter(|t| LEAST_T < *t)",
+        ] {
+            assert!(is(code), "{code}");
+        }
+        for code in [
+            "if t > LEAST_T * u {",
+            "if t > LEAST_T as f64 {",
+            "if t > LEAST_T.max(u) {",
+            "a > LEAST_T\n    * b",
+            "let seen = 2.0 * LEAST_T <= t;",
+            "f(LEAST_T)",
+            "let least: Vec<LEAST_T> = of;",
+        ] {
+            assert!(!is(code), "{code}");
+        }
     }
 }
