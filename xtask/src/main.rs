@@ -143,6 +143,10 @@ enum Command {
         /// Only constants whose name holds this.
         #[arg(long)]
         only: Option<String>,
+        /// Most campaigns that are diagnosed again for a constant halved, or doubled: so many stand for all in which it may
+        /// change something.
+        #[arg(long)]
+        most: Option<usize>,
         /// Write docs/trials/constants.md.
         #[arg(long)]
         write: bool,
@@ -230,11 +234,13 @@ fn main() -> anyhow::Result<()> {
             count,
             seed,
             only,
+            most,
             write,
         } => constants::Study {
             count,
             seed,
             only,
+            most,
             write,
         }
         .play(),

@@ -21,7 +21,7 @@ use anyhow::{Context, Result, bail, ensure};
 use crate::step::{cargo, command, program, program_in, root, run, target};
 use crate::trial::clean_commit;
 use kept::{SET, TOLD, WORDS};
-use moved::{Answers, Moved};
+use moved::{Answers, Moved, Others, Row};
 use tunable::Constant;
 
 /// The page.
@@ -37,6 +37,9 @@ pub struct Study {
     pub seed: u64,
     /// Only constants whose name holds this.
     pub only: Option<String>,
+    /// Most campaigns that are diagnosed again for a constant halved, or doubled; of more in which it may change something so
+    /// many stand for all.
+    pub most: Option<usize>,
     /// Write the page.
     pub write: bool,
 }
@@ -64,7 +67,7 @@ impl Study {
         let mut rows = Vec::new();
         for constant in constants.iter().filter(|constant| self.wants(constant)) {
             let moved = |at: usize| -> Result<Moved> {
-                Ok(as_it_is.moved(&bench.varied(&as_it_is, constant, at)?))
+                Ok(as_it_is.moved(&bench.varied(constant, at, self.most)?))
             };
             // Side by side: what is left to diagnose of most constants would keep one processor.
             let both = std::thread::scope(|scope| {
@@ -73,8 +76,11 @@ impl Study {
             });
             let [halved, doubled] =
                 both.map(|joined| joined.unwrap_or_else(|_| bail!("a thread panicked")));
-            let row = moved::row(constant, [&halved?, &doubled?]);
-            println!("{row}");
+            let row = Row {
+                constant,
+                moved: [halved?, doubled?],
+            };
+            println!("{}", row.line());
             rows.push(row);
         }
         if self.write {
@@ -94,8 +100,11 @@ impl Study {
     fn command(&self) -> String {
         let only = self.only.as_ref();
         let only = only.map_or_else(String::new, |only| format!(" --only {only}"));
+        let most = self
+            .most
+            .map_or_else(String::new, |most| format!(" --most {most}"));
         format!(
-            "cargo xtask constants --seed {} --count {}{only} --write",
+            "cargo xtask constants --seed {} --count {}{only}{most} --write",
             self.seed, self.count
         )
     }
@@ -171,23 +180,29 @@ impl Bench {
         Answers::read(&judged)
     }
 
-    /// The same with one constant halved or doubled. Only campaigns in which that may change something are diagnosed, and
-    /// answers that are there already are not asked for again.
-    fn varied(&self, as_it_is: &Answers, constant: &Constant, at: usize) -> Result<Answers> {
-        let touched = self.touched(constant, at)?;
-        if touched.is_empty() {
-            return Ok(as_it_is.clone());
-        }
-        let setting = format!("{}={:e}", constant.path(), constant.varied()[at]);
-        let judged = self.answers().join(setting.replace("::", "-") + ".json");
-        if !judged.exists() {
-            let only: Vec<&str> = touched.iter().map(String::as_str).collect();
-            self.judge(&judged, |score| {
-                score.args(["--jobs", "1", "--only", &only.join("|")]);
-                score.env(SET, &setting)
-            })?;
-        }
-        Ok(as_it_is.with(Answers::read(&judged)?))
+    /// Campaigns in which one constant halved or doubled may change something, at most so many of them, diagnosed with it.
+    /// Answers that are there already are not asked for again.
+    fn varied(&self, constant: &Constant, at: usize, most: Option<usize>) -> Result<Others> {
+        let touched: Vec<String> = self.touched(constant, at)?.into_iter().collect();
+        let played = evenly(&touched, most.unwrap_or(usize::MAX));
+        let answers = if played.is_empty() {
+            Answers::none()
+        } else {
+            let setting = format!("{}={:e}", constant.path(), constant.varied()[at]);
+            let name = format!("{}-of-{}.json", setting.replace("::", "-"), played.len());
+            let judged = self.answers().join(name);
+            if !judged.exists() {
+                self.judge(&judged, |score| {
+                    score.args(["--jobs", "1", "--only", &played.join("|")]);
+                    score.env(SET, &setting)
+                })?;
+            }
+            Answers::read(&judged)?
+        };
+        Ok(Others {
+            touched: touched.len(),
+            answers,
+        })
     }
 
     /// Campaigns in which another value of a constant may change something.
@@ -232,5 +247,25 @@ impl Bench {
         // Only what is judged of them is of use, and it is a hundredth of them.
         fs::remove_dir_all(&results)?;
         Ok(())
+    }
+}
+
+/// At most so many of these, evenly.
+fn evenly(all: &[String], most: usize) -> Vec<&str> {
+    let count = all.len().min(most);
+    let nth = |i: usize| all[(2 * i + 1) * all.len() / (2 * count)].as_str();
+    (0..count).map(nth).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn few_of_many_are_taken_evenly() {
+        let all: Vec<String> = (0..10).map(|i| i.to_string()).collect();
+        assert_eq!(evenly(&all, 2), ["2", "7"]);
+        assert_eq!(evenly(&all, 20), all);
+        assert!(evenly(&all, 0).is_empty() && evenly(&[], 3).is_empty());
     }
 }

@@ -57,12 +57,24 @@ struct Answer {
     figures: [Share; FIGURES.len()],
 }
 
+/// Other answers to some campaigns, which stand for all in which another constant may change something.
+pub struct Others {
+    /// How many those are.
+    pub touched: usize,
+    /// To campaigns evenly of them.
+    pub answers: Answers,
+}
+
 /// What other answers move.
 pub struct Moved {
-    /// Campaigns whose names differ.
+    /// Campaigns in which something may change, ...
+    touched: usize,
+    /// ... that were diagnosed again, ...
+    played: usize,
+    /// ... and whose names then differ.
     names: usize,
-    /// Points by which figures move, of those that move by more than [`POINTS`].
-    figures: Vec<(usize, f64)>,
+    /// Points by which each figure of all campaigns moves.
+    figures: [f64; FIGURES.len()],
 }
 
 impl Answers {
@@ -75,39 +87,47 @@ impl Answers {
         answers.collect::<Result<_>>().with_context(of).map(Self)
     }
 
-    /// These with others in place of their own.
-    pub fn with(&self, others: Self) -> Self {
-        let mut all = self.clone();
-        all.0.extend(others.0);
-        all
+    /// None.
+    pub fn none() -> Self {
+        Self(BTreeMap::new())
     }
 
     /// All that they count in a figure.
     fn figure(&self, at: usize) -> Share {
-        let of = self.0.values().map(|answer| answer.figures[at]);
-        of.fold(Share::default(), |sum, own| Share {
-            hits: sum.hits + own.hits,
-            of: sum.of + own.of,
-        })
+        sum(self.0.values(), at)
     }
 
-    /// What other answers to the same campaigns move.
-    pub fn moved(&self, others: &Self) -> Moved {
-        let other = |(campaign, own): &(&String, &Answer)| {
-            others
-                .0
-                .get(*campaign)
-                .is_none_or(|other| other.names != own.names)
+    /// What other answers move: each that was asked for again stands for as many that were not.
+    pub fn moved(&self, others: &Others) -> Moved {
+        let played = &others.answers.0;
+        let own = || played.keys().filter_map(|campaign| self.0.get(campaign));
+        let stands_for = others.touched as f64 / played.len().max(1) as f64;
+        let points = |at: usize| {
+            let (all, before, after) = (self.figure(at), sum(own(), at), sum(played.values(), at));
+            let changed = |all: usize, before: usize, after: usize| {
+                all as f64 + stands_for * (after as f64 - before as f64)
+            };
+            let hits = changed(all.hits, before.hits, after.hits);
+            100.0 * hits / changed(all.of, before.of, after.of).max(1.0) - all.percent()
         };
-        let points = |at: usize| others.figure(at).percent() - self.figure(at).percent();
-        let figures = (0..FIGURES.len()).map(|at| (at, points(at)));
         Moved {
-            names: self.0.iter().filter(other).count(),
-            figures: figures
-                .filter(|(_, points)| points.abs() > POINTS)
-                .collect(),
+            touched: others.touched,
+            played: played.len(),
+            names: own()
+                .zip(played.values())
+                .filter(|(a, b)| a.names != b.names)
+                .count(),
+            figures: core::array::from_fn(points),
         }
     }
+}
+
+/// All that answers count in a figure.
+fn sum<'a>(answers: impl Iterator<Item = &'a Answer>, at: usize) -> Share {
+    answers.fold(Share::default(), |sum, own| Share {
+        hits: sum.hits + own.figures[at].hits,
+        of: sum.of + own.figures[at].of,
+    })
 }
 
 impl Answer {
@@ -149,57 +169,83 @@ impl Answer {
 
 impl Moved {
     fn cell(&self) -> String {
-        let figures: Vec<String> = self
-            .figures
-            .iter()
+        let moved = self.figures.iter().enumerate();
+        let moved = moved.filter(|(_, points)| points.abs() > POINTS);
+        let moved: Vec<String> = moved
             .map(|(at, points)| format!("{}: {points:+.0}", at + 1))
             .collect();
-        format!("{} | {}", self.names, figures.join(", "))
+        let names = if self.played == 0 {
+            String::new()
+        } else {
+            format!("{} of {}", self.names, self.played)
+        };
+        format!("{} | {names} | {}", self.touched, moved.join(", "))
     }
 }
 
-/// One line of the page's table.
-pub fn row(constant: &Constant, [halved, doubled]: [&Moved; 2]) -> String {
-    let [low, high] = constant.varied();
-    format!(
-        "| `{}` | {} | {low} | {} | {high} | {} |",
-        constant.path(),
-        constant.value,
-        halved.cell(),
-        doubled.cell()
-    )
+/// One constant, halved and doubled.
+pub struct Row<'a> {
+    pub constant: &'a Constant,
+    pub moved: [Moved; 2],
+}
+
+impl Row<'_> {
+    /// Its line of the page's table.
+    pub fn line(&self) -> String {
+        let [low, high] = self.constant.varied();
+        let [halved, doubled] = self.moved.each_ref().map(Moved::cell);
+        let (path, value) = (self.constant.path(), self.constant.value);
+        format!("| `{path}` | {value} | {low} | {halved} | {high} | {doubled} |")
+    }
 }
 
 /// The page.
-pub fn page(command: &str, commit: &str, as_it_is: &Answers, rows: &[String]) -> String {
+pub fn page(command: &str, commit: &str, as_it_is: &Answers, rows: &[Row<'_>]) -> String {
     let campaigns = as_it_is.0.len();
+    let all: Vec<&Moved> = rows.iter().flat_map(|row| &row.moved).collect();
+    let count = |of: fn(&Moved) -> usize| all.iter().map(|moved| of(moved)).sum::<usize>();
     let figures: String = FIGURES
         .iter()
         .enumerate()
         .map(|(at, what)| {
             let share = as_it_is.figure(at);
+            let points = || all.iter().map(|moved| moved.figures[at]);
+            let mean = |sum: f64| sum / all.len().max(1) as f64;
             format!(
-                "| {} | {what} | {} of {} | {:.1} |\n",
+                "| {} | {what} | {} of {} | {:+.2} | {:.2} | {} | {} |\n",
                 at + 1,
                 share.hits,
                 share.of,
-                100.0 / share.of.max(1) as f64
+                mean(points().sum()),
+                mean(points().map(f64::abs).sum()),
+                points().filter(|points| *points > POINTS).count(),
+                points().filter(|points| *points < -POINTS).count(),
             )
         })
         .collect();
+    let lines: Vec<String> = rows.iter().map(Row::line).collect();
     format!(
         "# The engine's constants, halved and doubled\n\n\
          {campaigns} development campaigns with nothing missing, one effect, or one effect of the measuring chain alone, on ideal sensors and \
          through real chains; the same for every line. Engine of commit `{commit}`. Printed by\n\n\
          ```\n{command}\n```\n\n\
-         ## As it is\n\n\
-         | | figure | | one campaign, name or run is worth, points |\n| --- | --- | --- | --- |\n{figures}\n\
-         ## Each constant halved and doubled\n\n\
-         Of a share or a probability of 0.4 and more its odds are; a count is no less than one. Names: campaigns of {campaigns} whose names differ in number, kind or order. \
+         {} constants, each halved and doubled: {} settings. A constant that is only compared says itself where half or twice of it compares otherwise; \
+         elsewhere the answer is the same, and is not asked for. Of {} answers so touched {} were asked for again, evenly spread, and stand for the others; {} of them have other \
+         names (in number, kind or order).\n\n\
+         ## Figures\n\n\
+         | | figure | as it is | mean change, points | mean size of it | settings that raise it by more than {POINTS} points | lower it |\n\
+         | --- | --- | --- | --- | --- | --- | --- |\n{figures}\n\
+         ## Each constant\n\n\
+         Of a share or a probability of 0.4 and more its odds are halved and doubled; a count is no less than one. Touched: campaigns of {campaigns} in which it may change something. \
          Moved: figures of the table above that move by more than {POINTS} points, with by how many; a rise is good of 2 to 4, bad of the others.\n\n\
-         | constant | as it is | halved | names | moved | doubled | names | moved |\n\
-         | --- | --- | --- | --- | --- | --- | --- | --- |\n{}\n",
-        rows.join("\n")
+         | constant | as it is | halved | touched | other names | moved | doubled | touched | other names | moved |\n\
+         | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |\n{}\n",
+        rows.len(),
+        all.len(),
+        count(|moved| moved.touched),
+        count(|moved| moved.played),
+        count(|moved| moved.names),
+        lines.join("\n")
     )
 }
 
@@ -226,13 +272,35 @@ mod tests {
 
     #[test]
     fn a_campaign_that_is_named_otherwise_moves_what_it_counts_in() {
-        let (right, wrong) = (answers("force_lag", true), answers("force_delay", false));
-        let none = right.moved(&answers("force_lag", true));
-        assert!(none.names == 0 && none.figures.is_empty());
-        let moved = right.moved(&wrong);
-        assert_eq!(moved.names, 1);
+        let right = answers("force_lag", true);
+        let others = |answers: Answers, touched| Others { touched, answers };
+        let none = right.moved(&others(answers("force_lag", true), 2));
+        assert!(none.names == 0 && none.figures == [0.0; 6]);
+        let untouched = right.moved(&others(Answers::none(), 0));
+        assert!(untouched.played == 0 && untouched.figures == [0.0; 6]);
+        let moved = right.moved(&others(answers("force_delay", false), 2));
+        assert_eq!((moved.names, moved.played), (1, 2));
         // Right first, wrong calls of two, and worse runs of four.
-        assert_eq!(moved.figures, [(3, -100.0), (4, 50.0), (5, 25.0)]);
-        assert_eq!(moved.cell(), "1 | 4: -100, 5: +50, 6: +25");
+        assert_eq!(moved.figures, [0.0, 0.0, 0.0, -100.0, 50.0, 25.0]);
+        assert_eq!(moved.cell(), "2 | 1 of 2 | 4: -100, 5: +50, 6: +25");
+    }
+
+    #[test]
+    fn what_is_asked_for_again_stands_for_what_is_not() {
+        // Ten with nothing missing, of which one of four that are touched is asked for again.
+        let nulls = |names: core::ops::Range<usize>, false_physics: bool| {
+            let case = |name: usize| {
+                json!({
+                    "campaign": format!("{name}"), "stratum": "null", "real_chain": true, "of_the_chain": false,
+                    "strength": [], "false_physics": false_physics, "first_right": false, "named": [], "gains": [],
+                })
+            };
+            Answers(names.map(|name| Answer::of(&case(name)).unwrap()).collect())
+        };
+        let moved = nulls(0..10, false).moved(&Others {
+            touched: 4,
+            answers: nulls(3..4, true),
+        });
+        assert!((moved.figures[0] - 40.0).abs() < 1e-9);
     }
 }

@@ -165,13 +165,13 @@ fn functions(constant: &Constant) -> String {
     let [low, high] = constant.varied();
     format!(
         r#"#[must_use]
-#[allow(non_snake_case, clippy::all, clippy::pedantic)]
+#[allow(dead_code, non_snake_case, clippy::all, clippy::pedantic)]
 pub fn {name}() -> {kind} {{
     {name}_compared().0.taken()
 }}
 /// The same, compared.
 #[must_use]
-#[allow(non_snake_case, clippy::all, clippy::pedantic)]
+#[allow(dead_code, non_snake_case, clippy::all, clippy::pedantic)]
 pub fn {name}_compared() -> crate::constants::kept::Compared<{kind}> {{
     use crate::constants::kept::{{Compared, Kept}};
     static KEPT: std::sync::LazyLock<Kept<{kind}>> = std::sync::LazyLock::new(|| {{
