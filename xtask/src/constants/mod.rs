@@ -65,9 +65,17 @@ impl Study {
         self.generate(&bench.campaigns)?;
         let as_it_is = bench.as_it_is()?;
         let mut rows = Vec::new();
-        for constant in constants.iter().filter(|constant| self.wants(constant)) {
+        for (place, constant) in constants.iter().enumerate() {
+            if !self.wants(constant) {
+                continue;
+            }
             let moved = |at: usize| -> Result<Moved> {
-                Ok(as_it_is.moved(&bench.varied(constant, at, self.most)?))
+                let touched = bench.touched(constant, at)?;
+                let played = evenly(&touched, self.most.unwrap_or(usize::MAX), place);
+                Ok(as_it_is.moved(&Others {
+                    touched: touched.len(),
+                    answers: bench.varied(constant, at, &played)?,
+                }))
             };
             // Side by side: what is left to diagnose of most constants would keep one processor.
             let both = std::thread::scope(|scope| {
@@ -180,33 +188,25 @@ impl Bench {
         Answers::read(&judged)
     }
 
-    /// Campaigns in which one constant halved or doubled may change something, at most so many of them, diagnosed with it.
-    /// Answers that are there already are not asked for again.
-    fn varied(&self, constant: &Constant, at: usize, most: Option<usize>) -> Result<Others> {
-        let touched: Vec<String> = self.touched(constant, at)?.into_iter().collect();
-        let played = evenly(&touched, most.unwrap_or(usize::MAX));
-        let answers = if played.is_empty() {
-            Answers::none()
-        } else {
-            let setting = format!("{}={:e}", constant.path(), constant.varied()[at]);
-            let name = format!("{}-of-{}.json", setting.replace("::", "-"), played.len());
-            let judged = self.answers().join(name);
-            if !judged.exists() {
-                self.judge(&judged, |score| {
-                    score.args(["--jobs", "1", "--only", &played.join("|")]);
-                    score.env(SET, &setting)
-                })?;
-            }
-            Answers::read(&judged)?
-        };
-        Ok(Others {
-            touched: touched.len(),
-            answers,
-        })
+    /// Some campaigns diagnosed with one constant halved or doubled. Answers that are there already are not asked for again.
+    fn varied(&self, constant: &Constant, at: usize, played: &[&str]) -> Result<Answers> {
+        if played.is_empty() {
+            return Ok(Answers::none());
+        }
+        let setting = format!("{}={:e}", constant.path(), constant.varied()[at]);
+        let name = format!("{}-of-{}.json", setting.replace("::", "-"), played.len());
+        let judged = self.answers().join(name);
+        if !judged.exists() {
+            self.judge(&judged, |score| {
+                score.args(["--jobs", "1", "--only", &played.join("|")]);
+                score.env(SET, &setting)
+            })?;
+        }
+        Answers::read(&judged)
     }
 
     /// Campaigns in which another value of a constant may change something.
-    fn touched(&self, constant: &Constant, at: usize) -> Result<BTreeSet<String>> {
+    fn touched(&self, constant: &Constant, at: usize) -> Result<Vec<String>> {
         let mut touched = BTreeSet::new();
         for file in fs::read_dir(self.answers().join("told"))? {
             let file = file?;
@@ -217,7 +217,7 @@ impl Bench {
                 touched.insert(file.file_name().to_string_lossy().into_owned());
             }
         }
-        Ok(touched)
+        Ok(touched.into_iter().collect())
     }
 
     fn answers(&self) -> PathBuf {
@@ -250,10 +250,10 @@ impl Bench {
     }
 }
 
-/// At most so many of these, evenly.
-fn evenly(all: &[String], most: usize) -> Vec<&str> {
+/// At most so many of these, evenly, from another place on for each constant: so that not all are played on the same few.
+fn evenly(all: &[String], most: usize, place: usize) -> Vec<&str> {
     let count = all.len().min(most);
-    let nth = |i: usize| all[(2 * i + 1) * all.len() / (2 * count)].as_str();
+    let nth = |i: usize| all[((2 * i + 1) * all.len() / (2 * count) + place) % all.len()].as_str();
     (0..count).map(nth).collect()
 }
 
@@ -264,8 +264,9 @@ mod tests {
     #[test]
     fn few_of_many_are_taken_evenly() {
         let all: Vec<String> = (0..10).map(|i| i.to_string()).collect();
-        assert_eq!(evenly(&all, 2), ["2", "7"]);
-        assert_eq!(evenly(&all, 20), all);
-        assert!(evenly(&all, 0).is_empty() && evenly(&[], 3).is_empty());
+        assert_eq!(evenly(&all, 2, 0), ["2", "7"]);
+        assert_eq!(evenly(&all, 2, 4), ["6", "1"]);
+        assert_eq!(evenly(&all, 20, 0), all);
+        assert!(evenly(&all, 0, 1).is_empty() && evenly(&[], 3, 1).is_empty());
     }
 }
