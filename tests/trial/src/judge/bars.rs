@@ -311,6 +311,44 @@ pub fn sensors(cases: &[Case]) -> Vec<(String, Share)> {
     found
 }
 
+/// Figures with their bars beside those of another engine, each against the other's of the same key.
+pub fn beside(other: &str, own: &[Headline], others: &[Headline]) -> Table {
+    let mut table = Table::new(
+        "Figures and bars",
+        &[
+            "figure",
+            "bar",
+            "this engine",
+            "95 % interval",
+            "n",
+            "met",
+            other,
+            "95 % interval",
+            "n",
+            "met",
+        ],
+    );
+    for figure in own {
+        let [what, bar, value, interval, n, met] = figure.cells();
+        let of_other = others.iter().find(|other| other.key == figure.key);
+        let [_, _, others_value, others_interval, others_n, others_met] =
+            of_other.map_or_else(Default::default, Headline::cells);
+        table.row([
+            what,
+            bar,
+            value,
+            interval,
+            n,
+            met,
+            others_value,
+            others_interval,
+            others_n,
+            others_met,
+        ]);
+    }
+    table
+}
+
 /// Figures with their bars as a table.
 pub fn table(title: &str, figures: &[Headline]) -> Table {
     let mut table = Table::new(
@@ -321,4 +359,22 @@ pub fn table(title: &str, figures: &[Headline]) -> Table {
         table.row(figure.cells());
     }
     table
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_figure_stands_beside_the_other_engine_s_of_the_same_key() {
+        let share = |key: &str, hits| {
+            Headline::share(key, key, Better::Lower, Some(0.05), Share { hits, of: 40 })
+        };
+        let own = [share("null.false", 2), share("null.sure", 0)];
+        let table = beside("the other", &own, &[share("null.false", 26)]);
+        let cells = |row: usize| [2, 5, 6, 9].map(|column: usize| table.rows[row][column].as_str());
+        assert_eq!(cells(0)[2], "65.0 %");
+        assert!(cells(0)[3].contains("missed") && cells(0)[0] == "5.0 %");
+        assert_eq!(cells(1)[2], "");
+    }
 }

@@ -10,10 +10,16 @@ use crate::judge::case::Case;
 use crate::judge::cause::{shortfalls, symptom};
 use crate::judge::headline::Headline;
 use crate::judge::score::Report;
-use crate::judge::{bars, calibration, coverage, power, prediction, rivals, tally, uniform};
+use crate::judge::{
+    bars, calibration, certainty, coverage, power, prediction, rivals, tally, uniform,
+};
+use crate::report::pace::{self, Pace};
 use crate::report::plots;
 use crate::report::seal::voids;
 use crate::table::Table;
+
+/// The engine that this one took the place of.
+const EARLIER: &str = "the engine of commit 6b77987";
 
 /// What the pages tell beside the judged campaigns.
 pub struct Telling<'a> {
@@ -23,11 +29,26 @@ pub struct Telling<'a> {
     pub valid: &'a [Case],
     pub void: &'a [Case],
     pub report: &'a Report,
-    /// An earlier engine's cases, on every n-th campaign.
-    pub rival: Option<(usize, &'a [Case])>,
+    pub rival: Option<&'a Rival>,
     pub pace: &'a Table,
     /// What people found out about single cases: campaign's number and the cause.
     pub notes: &'a [(String, String)],
+}
+
+/// An earlier engine on the same files.
+pub struct Rival {
+    /// It was tried on every n-th campaign.
+    pub every: usize,
+    pub cases: Vec<Case>,
+    pub paces: Vec<Pace>,
+}
+
+impl Rival {
+    /// Those of the tool's cases that the earlier engine was tried on: another set of files is another test.
+    fn same(&self, cases: &[Case]) -> Vec<Case> {
+        let tried = |case: &&Case| self.cases.iter().any(|own| own.campaign == case.campaign);
+        cases.iter().filter(tried).cloned().collect()
+    }
 }
 
 /// Writes `trials.md`, and long tables and pictures into `trials/` beside it.
@@ -48,6 +69,9 @@ pub fn write(directory: &Path, telling: &Telling<'_>) -> Result<()> {
             tally::confusion(telling.valid).markdown()
         ),
     )?;
+    if let Some(rival) = telling.rival {
+        put(&beside.join("earlier.md"), beside_earlier(telling, rival))?;
+    }
     put(&beside.join("cases.csv"), cases_csv(&telling.report.cases))?;
     put(
         &beside.join("parameters.csv"),
@@ -96,6 +120,7 @@ fn front(telling: &Telling<'_>) -> String {
     text.push_str(
         "## Long tables\n\n\
          - [Confusion matrix](trials/confusion.md)\n\
+         - [Every figure beside the earlier engine's](trials/earlier.md)\n\
          - [Every campaign](trials/cases.csv)\n\
          - [Every parameter](trials/parameters.csv)\n\n\
          ## The twenty worst cases\n\n\
@@ -130,22 +155,40 @@ fn methods(telling: &Telling<'_>) -> Table {
         })
         .cloned()
         .collect();
-    let Some((every, earlier)) = telling.rival else {
+    let Some(rival) = telling.rival else {
         return rivals::baselines(telling.valid, &counts, &[]);
     };
-    // The tool once more, on what the earlier engine was tried on: another set of files is another test.
-    let same: Vec<Case> = telling
-        .valid
-        .iter()
-        .filter(|case| earlier.iter().any(|other| other.campaign == case.campaign))
-        .cloned()
-        .collect();
+    let every = rival.every;
+    let same = rival.same(telling.valid);
     let own = format!("muslip diagnose, every {every}th campaign");
-    let other = format!("the engine of commit 6b77987, every {every}th campaign");
-    let mut table = rivals::baselines(telling.valid, &counts, &[(&own, &same), (&other, earlier)]);
+    let other = format!("{EARLIER}, every {every}th campaign");
+    let others: [(&str, &[Case]); 2] = [(&own, &same), (&other, &rival.cases)];
+    let mut table = rivals::baselines(telling.valid, &counts, &others);
     table.title =
         format!("Methods on the same files, an earlier engine on every {every}th campaign of them");
     table
+}
+
+/// Every figure beside that of an earlier engine.
+fn beside_earlier(telling: &Telling<'_>, rival: &Rival) -> String {
+    let of = |cases: &[Case]| [bars::figures(cases), certainty(cases)].concat();
+    let mut own = of(&rival.same(telling.valid));
+    // A speed is no matter of the files.
+    own.extend(
+        telling
+            .figures
+            .iter()
+            .filter(|figure| figure.key.starts_with(pace::KEY))
+            .cloned(),
+    );
+    let mut earlier = of(&rival.cases);
+    earlier.extend(pace::headlines(&rival.paces));
+    format!(
+        "# Every figure beside the earlier engine's\n\nPart of the [sealed trial](../trials.md): both engines on every {}th of its campaigns, judged \
+         alike. Few campaigns: the intervals are wide, and the figures of the whole trial are this engine's alone.\n\n{}",
+        rival.every,
+        bars::beside(EARLIER, &own, &earlier).markdown()
+    )
 }
 
 /// Appends the tables that have rows.

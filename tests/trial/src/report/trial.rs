@@ -15,7 +15,7 @@ use crate::judge::score::{Report, ScoreRequest, score};
 use crate::judge::{bars, certainty};
 use crate::real;
 use crate::report::pace::{self, Pace};
-use crate::report::pages::{self, Telling};
+use crate::report::pages::{self, Rival, Telling};
 use crate::report::ratchet;
 use crate::report::seal::{SeedUse, Void, enter, seed_use, voids};
 use crate::setup::Trial;
@@ -131,21 +131,26 @@ pub fn trial(trial: &Trial) -> Result<Report> {
         every,
     };
     let measured = real::study(trial, &directory.join("measured"), &program[..12])?;
-    let paces = speeds(trial, &answers)?;
+    let paces = speeds(&trial.tool, trial, &answers)?;
     let report = score(&request(trial.tool.clone(), answers.clone(), 1))?;
     let (valid, void) = without_void(&report.cases, &voids());
     let rival = trial
         .rival
         .as_ref()
-        .map(|path| -> Result<Vec<Case>> {
+        .map(|path| -> Result<Rival> {
             let tool = Tool {
                 path: path.clone(),
                 diagnose_arguments: vec![],
             };
             let (tool, program) = frozen(&tool, &trial.work)?;
             let results = directory.join(format!("rival-{}-{}", &hash[..12], &program[..12]));
+            let paces = speeds(&tool, trial, &results)?;
             let cases = score(&request(tool, results, RIVAL_EVERY))?.cases;
-            Ok(without_void(&cases, &voids()).0)
+            Ok(Rival {
+                every: RIVAL_EVERY,
+                cases: without_void(&cases, &voids()).0,
+                paces,
+            })
         })
         .transpose()?;
     let figures = figures(&valid, &paces, &measured.headlines);
@@ -165,7 +170,7 @@ pub fn trial(trial: &Trial) -> Result<Report> {
                 valid: &valid,
                 void: &void,
                 report: &report,
-                rival: rival.as_deref().map(|cases| (RIVAL_EVERY, cases)),
+                rival: rival.as_ref(),
                 pace: &pace::table(&paces),
                 notes: &pages::notes(&pages.join("trials").join("causes.txt"), &hash),
             },
@@ -279,7 +284,7 @@ fn frozen(tool: &Tool, work: &Path) -> Result<(Tool, String)> {
 }
 
 /// Speeds, kept beside the answers so that a trial that was stopped does not measure again.
-fn speeds(trial: &Trial, answers: &Path) -> Result<Vec<Pace>> {
+fn speeds(tool: &Tool, trial: &Trial, answers: &Path) -> Result<Vec<Pace>> {
     let kept = answers.join(if trial.ten_million {
         "pace.json"
     } else {
@@ -291,7 +296,7 @@ fn speeds(trial: &Trial, answers: &Path) -> Result<Vec<Pace>> {
         return Ok(found);
     }
     let found = pace::paces(
-        &trial.tool,
+        tool,
         &trial.work.join("pace"),
         if trial.small { 2 } else { 20 },
         trial.ten_million && !trial.small,
