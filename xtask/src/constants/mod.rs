@@ -12,9 +12,10 @@ mod kept;
 mod moved;
 mod tunable;
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, bail, ensure};
 
@@ -40,6 +41,8 @@ pub struct Study {
     /// Most campaigns that are diagnosed again for a constant halved, or doubled; of more in which it may change something so
     /// many stand for all.
     pub most: Option<usize>,
+    /// Minutes after which no further constant is begun.
+    pub minutes: Option<u64>,
     /// Write the page.
     pub write: bool,
 }
@@ -64,9 +67,12 @@ impl Study {
         };
         self.generate(&bench.campaigns)?;
         let as_it_is = bench.as_it_is()?;
-        let mut rows = Vec::new();
-        for (place, constant) in constants.iter().enumerate() {
-            if !self.wants(constant) {
+        let until = self
+            .minutes
+            .map(|minutes| Instant::now() + Duration::from_secs(60 * minutes));
+        let mut rows = BTreeMap::new();
+        for (place, constant) in bench.cheapest_first(&constants, self.most)? {
+            if !self.wants(constant) || until.is_some_and(|until| Instant::now() > until) {
                 continue;
             }
             let moved = |at: usize| -> Result<Moved> {
@@ -89,10 +95,19 @@ impl Study {
                 moved: [halved?, doubled?],
             };
             println!("{}", row.line());
-            rows.push(row);
+            rows.insert(place, row);
         }
         if self.write {
-            let page = moved::page(&self.command(), &commit, &as_it_is, &rows);
+            let rows: Vec<Row<'_>> = rows.into_values().collect();
+            let play = moved::Play {
+                command: &self.command(),
+                commit: &commit,
+                constants: constants
+                    .iter()
+                    .filter(|constant| self.wants(constant))
+                    .count(),
+            };
+            let page = moved::page(&play, &as_it_is, &rows);
             fs::write(root().join(PAGE), page).context(PAGE)?;
             println!("{PAGE}");
         }
@@ -203,6 +218,30 @@ impl Bench {
             })?;
         }
         Answers::read(&judged)
+    }
+
+    /// Constants with their places, those first of which fewest campaigns are diagnosed again.
+    fn cheapest_first<'a>(
+        &self,
+        constants: &'a [Constant],
+        most: Option<usize>,
+    ) -> Result<Vec<(usize, &'a Constant)>> {
+        let mut all = Vec::new();
+        for (place, constant) in constants.iter().enumerate() {
+            let played = [0, 1].map(|at| -> Result<usize> {
+                Ok(self
+                    .touched(constant, at)?
+                    .len()
+                    .min(most.unwrap_or(usize::MAX)))
+            });
+            let [halved, doubled] = played;
+            all.push((halved? + doubled?, place, constant));
+        }
+        all.sort_by_key(|(played, place, _)| (*played, *place));
+        Ok(all
+            .into_iter()
+            .map(|(_, place, constant)| (place, constant))
+            .collect())
     }
 
     /// Campaigns in which another value of a constant may change something.

@@ -199,8 +199,21 @@ impl Row<'_> {
     }
 }
 
+/// What was played.
+pub struct Play<'a> {
+    pub command: &'a str,
+    pub commit: &'a str,
+    /// Constants that were to be, of which time may have left some out.
+    pub constants: usize,
+}
+
 /// The page.
-pub fn page(command: &str, commit: &str, as_it_is: &Answers, rows: &[Row<'_>]) -> String {
+pub fn page(play: &Play<'_>, as_it_is: &Answers, rows: &[Row<'_>]) -> String {
+    let Play {
+        command,
+        commit,
+        constants,
+    } = play;
     let campaigns = as_it_is.0.len();
     let all: Vec<&Moved> = rows.iter().flat_map(|row| &row.moved).collect();
     let count = |of: fn(&Moved) -> usize| all.iter().map(|moved| of(moved)).sum::<usize>();
@@ -229,7 +242,7 @@ pub fn page(command: &str, commit: &str, as_it_is: &Answers, rows: &[Row<'_>]) -
          {campaigns} development campaigns with nothing missing, one effect, or one effect of the measuring chain alone, on ideal sensors and \
          through real chains; the same for every line. Engine of commit `{commit}`. Printed by\n\n\
          ```\n{command}\n```\n\n\
-         {} constants, each halved and doubled: {} settings. A constant that is only compared says itself where half or twice of it compares otherwise; \
+         {} of {constants} constants, each halved and doubled: {} settings. A constant that is only compared says itself where half or twice of it compares otherwise; \
          elsewhere the answer is the same, and is not asked for. Of {} answers so touched {} were asked for again, evenly spread, and stand for the others; {} of them have other \
          names (in number, kind or order).\n\n\
          ## Figures\n\n\
