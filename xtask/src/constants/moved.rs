@@ -11,8 +11,6 @@ use super::tunable::Constant;
 
 /// Confidence of a call that is to be right.
 const SURE: f64 = 0.9;
-/// Points by which a figure moves.
-const POINTS: f64 = 2.0;
 /// Strength from which an effect is to be named, with the calibration's own tolerance.
 const TO_BE_NAMED: f64 = 0.57;
 
@@ -73,8 +71,10 @@ pub struct Moved {
     played: usize,
     /// ... and whose names then differ.
     names: usize,
-    /// Points by which each figure of all campaigns moves.
-    figures: [f64; FIGURES.len()],
+    /// Hits that each figure has more in them, ...
+    hits: [i64; FIGURES.len()],
+    /// ... and by how many points that would move it, were all touched campaigns like them.
+    points: [f64; FIGURES.len()],
 }
 
 impl Answers {
@@ -102,22 +102,26 @@ impl Answers {
         let played = &others.answers.0;
         let own = || played.keys().filter_map(|campaign| self.0.get(campaign));
         let stands_for = others.touched as f64 / played.len().max(1) as f64;
+        let of = |at: usize| (sum(own(), at), sum(played.values(), at));
         let points = |at: usize| {
-            let (all, before, after) = (self.figure(at), sum(own(), at), sum(played.values(), at));
+            let (all, (before, after)) = (self.figure(at), of(at));
             let changed = |all: usize, before: usize, after: usize| {
                 all as f64 + stands_for * (after as f64 - before as f64)
             };
             let hits = changed(all.hits, before.hits, after.hits);
             100.0 * hits / changed(all.of, before.of, after.of).max(1.0) - all.percent()
         };
+        let hits = |at: usize| {
+            let (before, after) = of(at);
+            after.hits as i64 - before.hits as i64
+        };
+        let names = own().zip(played.values());
         Moved {
             touched: others.touched,
             played: played.len(),
-            names: own()
-                .zip(played.values())
-                .filter(|(a, b)| a.names != b.names)
-                .count(),
-            figures: core::array::from_fn(points),
+            names: names.filter(|(a, b)| a.names != b.names).count(),
+            hits: core::array::from_fn(hits),
+            points: core::array::from_fn(points),
         }
     }
 }
@@ -169,10 +173,10 @@ impl Answer {
 
 impl Moved {
     fn cell(&self) -> String {
-        let moved = self.figures.iter().enumerate();
-        let moved = moved.filter(|(_, points)| points.abs() > POINTS);
+        let moved = self.hits.iter().enumerate();
         let moved: Vec<String> = moved
-            .map(|(at, points)| format!("{}: {points:+.0}", at + 1))
+            .filter(|(_, hits)| **hits != 0)
+            .map(|(at, hits)| format!("{}: {hits:+}", at + 1))
             .collect();
         let names = if self.played == 0 {
             String::new()
@@ -199,6 +203,14 @@ impl Row<'_> {
     }
 }
 
+/// Mean, and its standard error.
+fn mean_and_error(values: &[f64]) -> (f64, f64) {
+    let n = values.len().max(1) as f64;
+    let mean = values.iter().sum::<f64>() / n;
+    let square: f64 = values.iter().map(|value| (value - mean).powi(2)).sum();
+    (mean, (square / (n - 1.0).max(1.0) / n).sqrt())
+}
+
 /// What was played.
 pub struct Play<'a> {
     pub command: &'a str,
@@ -222,17 +234,19 @@ pub fn page(play: &Play<'_>, as_it_is: &Answers, rows: &[Row<'_>]) -> String {
         .enumerate()
         .map(|(at, what)| {
             let share = as_it_is.figure(at);
-            let points = || all.iter().map(|moved| moved.figures[at]);
-            let mean = |sum: f64| sum / all.len().max(1) as f64;
+            let points: Vec<f64> = all.iter().map(|moved| moved.points[at]).collect();
+            let (mean, error) = mean_and_error(&points);
+            let settings = |sign: i64| {
+                let moved = all.iter().filter(|moved| moved.hits[at].signum() == sign);
+                moved.count()
+            };
             format!(
-                "| {} | {what} | {} of {} | {:+.2} | {:.2} | {} | {} |\n",
+                "| {} | {what} | {} of {} | {mean:+.2} ± {error:.2} | {} | {} |\n",
                 at + 1,
                 share.hits,
                 share.of,
-                mean(points().sum()),
-                mean(points().map(f64::abs).sum()),
-                points().filter(|points| *points > POINTS).count(),
-                points().filter(|points| *points < -POINTS).count(),
+                settings(1),
+                settings(-1),
             )
         })
         .collect();
@@ -246,11 +260,13 @@ pub fn page(play: &Play<'_>, as_it_is: &Answers, rows: &[Row<'_>]) -> String {
          elsewhere the answer is the same, and is not asked for. Of {} answers so touched {} were asked for again, evenly spread, and stand for the others; {} of them have other \
          names (in number, kind or order).\n\n\
          ## Figures\n\n\
-         | | figure | as it is | mean change, points | mean size of it | settings that raise it by more than {POINTS} points | lower it |\n\
-         | --- | --- | --- | --- | --- | --- | --- |\n{figures}\n\
+         A setting is one constant halved or doubled. What it moves a figure by: the mean over settings with its standard error, were all that it touches like what was \
+         asked for again. Of one setting alone so few answers say little.\n\n\
+         | | figure | as it is | a setting moves it by, points | settings with more | with fewer |\n\
+         | --- | --- | --- | --- | --- | --- |\n{figures}\n\
          ## Each constant\n\n\
          Of a share or a probability of 0.4 and more its odds are halved and doubled; a count is no less than one. Touched: campaigns of {campaigns} in which it may change something. \
-         Moved: figures of the table above that move by more than {POINTS} points, with by how many; a rise is good of 2 to 4, bad of the others.\n\n\
+         Moved: figures of the table above that count more or fewer in what was asked for again; more is good of 2 to 4, bad of the others.\n\n\
          | constant | as it is | halved | touched | other names | moved | doubled | touched | other names | moved |\n\
          | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |\n{}\n",
         rows.len(),
@@ -288,14 +304,21 @@ mod tests {
         let right = answers("force_lag", true);
         let others = |answers: Answers, touched| Others { touched, answers };
         let none = right.moved(&others(answers("force_lag", true), 2));
-        assert!(none.names == 0 && none.figures == [0.0; 6]);
+        assert!(none.names == 0 && none.hits == [0; 6]);
         let untouched = right.moved(&others(Answers::none(), 0));
-        assert!(untouched.played == 0 && untouched.figures == [0.0; 6]);
+        assert!(untouched.played == 0 && untouched.points == [0.0; 6]);
         let moved = right.moved(&others(answers("force_delay", false), 2));
         assert_eq!((moved.names, moved.played), (1, 2));
         // Right first, wrong calls of two, and worse runs of four.
-        assert_eq!(moved.figures, [0.0, 0.0, 0.0, -100.0, 50.0, 25.0]);
-        assert_eq!(moved.cell(), "2 | 1 of 2 | 4: -100, 5: +50, 6: +25");
+        assert_eq!(moved.points, [0.0, 0.0, 0.0, -100.0, 50.0, 25.0]);
+        assert_eq!(moved.cell(), "2 | 1 of 2 | 4: -1, 5: +1, 6: +1");
+    }
+
+    #[test]
+    fn a_mean_is_as_sure_as_its_values_are_alike_and_many() {
+        // Four thirds are their variance.
+        let (mean, error) = mean_and_error(&[1.0, 1.0, 3.0, 3.0]);
+        assert!((mean - 2.0).abs() < 1e-12 && (error - (4.0f64 / 3.0 / 4.0).sqrt()).abs() < 1e-12);
     }
 
     #[test]
@@ -314,6 +337,6 @@ mod tests {
             touched: 4,
             answers: nulls(3..4, true),
         });
-        assert!((moved.figures[0] - 40.0).abs() < 1e-9);
+        assert!((moved.points[0] - 40.0).abs() < 1e-9 && moved.hits[0] == 1);
     }
 }
