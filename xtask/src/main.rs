@@ -147,9 +147,6 @@ enum Command {
         /// change something.
         #[arg(long)]
         most: Option<usize>,
-        /// Begin no further constant after so many minutes; those of which fewest campaigns are diagnosed again come first.
-        #[arg(long)]
-        minutes: Option<u64>,
         /// Write docs/trials/constants.md.
         #[arg(long)]
         write: bool,
@@ -238,14 +235,12 @@ fn main() -> anyhow::Result<()> {
             seed,
             only,
             most,
-            minutes,
             write,
         } => constants::Study {
             count,
             seed,
             only,
             most,
-            minutes,
             write,
         }
         .play(),

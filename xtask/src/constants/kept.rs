@@ -1,6 +1,6 @@
 //! A constant that can be set, and that tells whether half or twice of it could have changed a result.
 //!
-//! The text of this file goes into the changed engine ([`super::tunable`]); here it is compiled for its tests alone.
+//! The text of this file goes into the changed engine ([`super::tunable`]); here its words and names are used, and its tests run.
 
 use std::cmp::Ordering;
 use std::fs::OpenOptions;

@@ -15,7 +15,6 @@ mod tunable;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, bail, ensure};
 
@@ -41,8 +40,6 @@ pub struct Study {
     /// Most campaigns that are diagnosed again for a constant halved, or doubled; of more in which it may change something so
     /// many stand for all.
     pub most: Option<usize>,
-    /// Minutes after which no further constant is begun.
-    pub minutes: Option<u64>,
     /// Write the page.
     pub write: bool,
 }
@@ -66,22 +63,19 @@ impl Study {
             campaigns: folder.join(format!("campaigns-{}-{}", self.seed, self.count)),
         };
         self.generate(&bench.campaigns)?;
-        let as_it_is = bench.as_it_is()?;
-        let until = self
-            .minutes
-            .map(|minutes| Instant::now() + Duration::from_secs(60 * minutes));
-        let mut rows = BTreeMap::new();
-        for (place, constant) in bench.cheapest_first(&constants, self.most)? {
-            if !self.wants(constant) || until.is_some_and(|until| Instant::now() > until) {
+        let (as_it_is, told) = bench.as_it_is()?;
+        let mut rows = Vec::new();
+        for (place, constant) in constants.iter().enumerate() {
+            if !self.wants(constant) {
                 continue;
             }
             let moved = |at: usize| -> Result<Moved> {
-                let touched = bench.touched(constant, at)?;
+                let touched = told.touched(constant, at);
                 let played = evenly(&touched, self.most.unwrap_or(usize::MAX), place);
-                Ok(as_it_is.moved(&Others {
+                as_it_is.moved(&Others {
                     touched: touched.len(),
                     answers: bench.varied(constant, at, &played)?,
-                }))
+                })
             };
             // Side by side: what is left to diagnose of most constants would keep one processor.
             let both = std::thread::scope(|scope| {
@@ -95,19 +89,10 @@ impl Study {
                 moved: [halved?, doubled?],
             };
             println!("{}", row.line());
-            rows.insert(place, row);
+            rows.push(row);
         }
         if self.write {
-            let rows: Vec<Row<'_>> = rows.into_values().collect();
-            let play = moved::Play {
-                command: &self.command(),
-                commit: &commit,
-                constants: constants
-                    .iter()
-                    .filter(|constant| self.wants(constant))
-                    .count(),
-            };
-            let page = moved::page(&play, &as_it_is, &rows);
+            let page = moved::page(&self.command(), &commit, &as_it_is, &rows);
             fs::write(root().join(PAGE), page).context(PAGE)?;
             println!("{PAGE}");
         }
@@ -189,18 +174,17 @@ struct Bench {
 
 impl Bench {
     /// All campaigns diagnosed with the constants as they are, and what those tell of other values.
-    fn as_it_is(&self) -> Result<Answers> {
+    fn as_it_is(&self) -> Result<(Answers, Told)> {
         let told = self.answers().join("told");
         let judged = self.answers().join("as-it-is.json");
         if !judged.exists() {
-            // What a run that was stopped has told may be a part of it.
-            if told.exists() {
-                fs::remove_dir_all(&told)?;
-            }
+            // What a run that was stopped has told of campaigns that it has answered stays true.
             fs::create_dir_all(&told)?;
             self.judge(&judged, |score| score.env(TOLD, &told))?;
         }
-        Answers::read(&judged)
+        let answers = Answers::read(&judged)?;
+        answers.ensure_answered()?;
+        Ok((answers, Told::read(&told)?))
     }
 
     /// Some campaigns diagnosed with one constant halved or doubled. Answers that are there already are not asked for again.
@@ -218,45 +202,6 @@ impl Bench {
             })?;
         }
         Answers::read(&judged)
-    }
-
-    /// Constants with their places, those first of which fewest campaigns are diagnosed again.
-    fn cheapest_first<'a>(
-        &self,
-        constants: &'a [Constant],
-        most: Option<usize>,
-    ) -> Result<Vec<(usize, &'a Constant)>> {
-        let mut all = Vec::new();
-        for (place, constant) in constants.iter().enumerate() {
-            let played = [0, 1].map(|at| -> Result<usize> {
-                Ok(self
-                    .touched(constant, at)?
-                    .len()
-                    .min(most.unwrap_or(usize::MAX)))
-            });
-            let [halved, doubled] = played;
-            all.push((halved? + doubled?, place, constant));
-        }
-        all.sort_by_key(|(played, place, _)| (*played, *place));
-        Ok(all
-            .into_iter()
-            .map(|(_, place, constant)| (place, constant))
-            .collect())
-    }
-
-    /// Campaigns in which another value of a constant may change something.
-    fn touched(&self, constant: &Constant, at: usize) -> Result<Vec<String>> {
-        let mut touched = BTreeSet::new();
-        for file in fs::read_dir(self.answers().join("told"))? {
-            let file = file?;
-            let text = fs::read_to_string(file.path())?;
-            let path = constant.path();
-            let mut told = text.lines().filter_map(|line| line.split_once(' '));
-            if told.any(|(of, word)| of == path && (word == WORDS[at] || word == WORDS[2])) {
-                touched.insert(file.file_name().to_string_lossy().into_owned());
-            }
-        }
-        Ok(touched.into_iter().collect())
     }
 
     fn answers(&self) -> PathBuf {
@@ -289,10 +234,42 @@ impl Bench {
     }
 }
 
+/// What constants tell of other values: path and word, with the campaigns.
+struct Told(BTreeMap<String, BTreeSet<String>>);
+
+impl Told {
+    /// Reads what is told, one file a campaign.
+    fn read(folder: &Path) -> Result<Self> {
+        let mut all = BTreeMap::<String, BTreeSet<String>>::new();
+        for file in fs::read_dir(folder)? {
+            let file = file?;
+            let campaign = file.file_name().to_string_lossy().into_owned();
+            for line in fs::read_to_string(file.path())?.lines() {
+                all.entry(line.to_owned())
+                    .or_default()
+                    .insert(campaign.clone());
+            }
+        }
+        Ok(Self(all))
+    }
+
+    /// Campaigns in which a constant halved, or doubled, may change something.
+    fn touched(&self, constant: &Constant, at: usize) -> Vec<&str> {
+        let path = constant.path();
+        let of = |word: &str| self.0.get(&format!("{path} {word}"));
+        let touched: BTreeSet<&String> = [of(WORDS[at]), of(WORDS[2])]
+            .into_iter()
+            .flatten()
+            .flatten()
+            .collect();
+        touched.into_iter().map(String::as_str).collect()
+    }
+}
+
 /// At most so many of these, evenly, from another place on for each constant: so that not all are played on the same few.
-fn evenly(all: &[String], most: usize, place: usize) -> Vec<&str> {
+fn evenly<'a>(all: &[&'a str], most: usize, place: usize) -> Vec<&'a str> {
     let count = all.len().min(most);
-    let nth = |i: usize| all[((2 * i + 1) * all.len() / (2 * count) + place) % all.len()].as_str();
+    let nth = |i: usize| all[((2 * i + 1) * all.len() / (2 * count) + place) % all.len()];
     (0..count).map(nth).collect()
 }
 
@@ -303,6 +280,7 @@ mod tests {
     #[test]
     fn few_of_many_are_taken_evenly() {
         let all: Vec<String> = (0..10).map(|i| i.to_string()).collect();
+        let all: Vec<&str> = all.iter().map(String::as_str).collect();
         assert_eq!(evenly(&all, 2, 0), ["2", "7"]);
         assert_eq!(evenly(&all, 2, 4), ["6", "1"]);
         assert_eq!(evenly(&all, 20, 0), all);

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, ensure};
 use serde_json::Value;
 
 use super::tunable::Constant;
@@ -49,8 +49,9 @@ pub struct Answers(BTreeMap<String, Answer>);
 /// A judged answer.
 #[derive(Clone, Default)]
 struct Answer {
-    /// Names, first first.
+    /// Names, first first; of a diagnosis that failed, with what.
     names: Vec<String>,
+    failed: bool,
     /// What it counts in the figures.
     figures: [Share; FIGURES.len()],
 }
@@ -98,11 +99,20 @@ impl Answers {
     }
 
     /// What other answers move: each that was asked for again stands for as many that were not.
-    pub fn moved(&self, others: &Others) -> Moved {
-        let played = &others.answers.0;
-        let own = || played.keys().filter_map(|campaign| self.0.get(campaign));
-        let stands_for = others.touched as f64 / played.len().max(1) as f64;
-        let of = |at: usize| (sum(own(), at), sum(played.values(), at));
+    ///
+    /// # Errors
+    /// Where a campaign is none of these.
+    pub fn moved(&self, others: &Others) -> Result<Moved> {
+        let mut pairs = Vec::new();
+        for (campaign, other) in &others.answers.0 {
+            let own = self.0.get(campaign).with_context(|| campaign.clone())?;
+            pairs.push((own, other));
+        }
+        let stands_for = others.touched as f64 / pairs.len().max(1) as f64;
+        let of = |at: usize| {
+            let before = sum(pairs.iter().map(|pair| pair.0), at);
+            (before, sum(pairs.iter().map(|pair| pair.1), at))
+        };
         let points = |at: usize| {
             let (all, (before, after)) = (self.figure(at), of(at));
             let changed = |all: usize, before: usize, after: usize| {
@@ -115,14 +125,25 @@ impl Answers {
             let (before, after) = of(at);
             after.hits as i64 - before.hits as i64
         };
-        let names = own().zip(played.values());
-        Moved {
+        let differ = |pair: &&(&Answer, &Answer)| pair.0.names != pair.1.names;
+        Ok(Moved {
             touched: others.touched,
-            played: played.len(),
-            names: names.filter(|(a, b)| a.names != b.names).count(),
+            played: pairs.len(),
+            names: pairs.iter().filter(differ).count(),
             hits: core::array::from_fn(hits),
             points: core::array::from_fn(points),
+        })
+    }
+
+    /// Refuses answers of which one is none: half of them would pass for a diagnosis that names nothing.
+    ///
+    /// # Errors
+    /// Where a diagnosis failed.
+    pub fn ensure_answered(&self) -> Result<()> {
+        for (campaign, answer) in &self.0 {
+            ensure!(!answer.failed, "{campaign}: {}", answer.names.join("; "));
         }
+        Ok(())
     }
 }
 
@@ -145,6 +166,10 @@ impl Answer {
         let named = list("named")?;
         let ids = named.iter().map(|name| text(&name["id"]));
         own.names = ids.collect::<Result<_>>()?;
+        let complaints = list("complaints")?.iter().map(&text);
+        let complaints = complaints.collect::<Result<Vec<_>>>()?;
+        own.failed = !complaints.is_empty();
+        own.names.extend(complaints);
         let [null, told, ideal, chains, sure, worse] = &mut own.figures;
         match text(&case["stratum"])?.as_str() {
             "null" => null.add(flag("false_physics")?),
@@ -211,21 +236,8 @@ fn mean_and_error(values: &[f64]) -> (f64, f64) {
     (mean, (square / (n - 1.0).max(1.0) / n).sqrt())
 }
 
-/// What was played.
-pub struct Play<'a> {
-    pub command: &'a str,
-    pub commit: &'a str,
-    /// Constants that were to be, of which time may have left some out.
-    pub constants: usize,
-}
-
 /// The page.
-pub fn page(play: &Play<'_>, as_it_is: &Answers, rows: &[Row<'_>]) -> String {
-    let Play {
-        command,
-        commit,
-        constants,
-    } = play;
+pub fn page(command: &str, commit: &str, as_it_is: &Answers, rows: &[Row<'_>]) -> String {
     let campaigns = as_it_is.0.len();
     let all: Vec<&Moved> = rows.iter().flat_map(|row| &row.moved).collect();
     let count = |of: fn(&Moved) -> usize| all.iter().map(|moved| of(moved)).sum::<usize>();
@@ -256,12 +268,12 @@ pub fn page(play: &Play<'_>, as_it_is: &Answers, rows: &[Row<'_>]) -> String {
          {campaigns} development campaigns with nothing missing, one effect, or one effect of the measuring chain alone, on ideal sensors and \
          through real chains; the same for every line. Engine of commit `{commit}`. Printed by\n\n\
          ```\n{command}\n```\n\n\
-         {} of {constants} constants, each halved and doubled: {} settings. A constant that is only compared says itself where half or twice of it compares otherwise; \
+         {} scalar constants of the engine's tables, each halved and doubled: {} settings. A constant that is only compared says itself where half or twice of it compares otherwise; \
          elsewhere the answer is the same, and is not asked for. Of {} answers so touched {} were asked for again, evenly spread, and stand for the others; {} of them have other \
          names (in number, kind or order).\n\n\
          ## Figures\n\n\
          A setting is one constant halved or doubled. What it moves a figure by: the mean over settings with its standard error, were all that it touches like what was \
-         asked for again. Of one setting alone so few answers say little.\n\n\
+         asked for again; as if settings were drawn independently, which those of one constant, or on one campaign, are not. Of one setting alone so few answers say little.\n\n\
          | | figure | as it is | a setting moves it by, points | settings with more | with fewer |\n\
          | --- | --- | --- | --- | --- | --- |\n{figures}\n\
          ## Each constant\n\n\
@@ -289,7 +301,7 @@ mod tests {
                 "campaign": campaign, "stratum": stratum, "real_chain": true, "of_the_chain": false,
                 "strength": [1.0], "false_physics": !right, "first_right": right,
                 "named": [{"id": id, "confidence": 0.95, "right": right}],
-                "gains": [{"worse": false}, {"worse": !right}],
+                "gains": [{"worse": false}, {"worse": !right}], "complaints": [],
             })
         };
         let cases = [
@@ -303,15 +315,34 @@ mod tests {
     fn a_campaign_that_is_named_otherwise_moves_what_it_counts_in() {
         let right = answers("force_lag", true);
         let others = |answers: Answers, touched| Others { touched, answers };
-        let none = right.moved(&others(answers("force_lag", true), 2));
+        let none = right.moved(&others(answers("force_lag", true), 2)).unwrap();
         assert!(none.names == 0 && none.hits == [0; 6]);
-        let untouched = right.moved(&others(Answers::none(), 0));
+        let untouched = right.moved(&others(Answers::none(), 0)).unwrap();
         assert!(untouched.played == 0 && untouched.points == [0.0; 6]);
-        let moved = right.moved(&others(answers("force_delay", false), 2));
+        let moved = right
+            .moved(&others(answers("force_delay", false), 2))
+            .unwrap();
         assert_eq!((moved.names, moved.played), (1, 2));
         // Right first, wrong calls of two, and worse runs of four.
         assert_eq!(moved.points, [0.0, 0.0, 0.0, -100.0, 50.0, 25.0]);
         assert_eq!(moved.cell(), "2 | 1 of 2 | 4: -1, 5: +1, 6: +1");
+    }
+
+    #[test]
+    fn a_diagnosis_that_failed_is_no_answer() {
+        let case = json!({
+            "campaign": "0", "stratum": "pair", "named": [], "gains": [], "complaints": ["it took too long"],
+        });
+        let failed = Answers([Answer::of(&case).unwrap()].into());
+        assert!(failed.ensure_answered().is_err());
+        assert!(answers("force_lag", true).ensure_answered().is_ok());
+        // Of another value it is another answer.
+        let own = Answers([("0".to_owned(), Answer::default())].into());
+        let others = Others {
+            touched: 1,
+            answers: failed,
+        };
+        assert_eq!(own.moved(&others).unwrap().names, 1);
     }
 
     #[test]
@@ -328,7 +359,7 @@ mod tests {
             let case = |name: usize| {
                 json!({
                     "campaign": format!("{name}"), "stratum": "null", "real_chain": true, "of_the_chain": false,
-                    "strength": [], "false_physics": false_physics, "first_right": false, "named": [], "gains": [],
+                    "strength": [], "false_physics": false_physics, "first_right": false, "named": [], "gains": [], "complaints": [],
                 })
             };
             Answers(names.map(|name| Answer::of(&case(name)).unwrap()).collect())
@@ -337,6 +368,7 @@ mod tests {
             touched: 4,
             answers: nulls(3..4, true),
         });
+        let moved = moved.unwrap();
         assert!((moved.points[0] - 40.0).abs() < 1e-9 && moved.hits[0] == 1);
     }
 }

@@ -156,7 +156,7 @@ fn settable(text: &str, table: &str, constants: &[Constant]) -> String {
     all
 }
 
-/// The functions of a constant, by its name: its value, and what is compared with it.
+/// The functions of a constant, by its name: its value, and the constant to be compared.
 fn functions(constant: &Constant) -> String {
     let Constant {
         name, kind, value, ..
@@ -169,7 +169,7 @@ fn functions(constant: &Constant) -> String {
 pub fn {name}() -> {kind} {{
     {name}_compared().0.taken()
 }}
-/// The same, compared.
+/// The same, to be compared.
 #[must_use]
 #[allow(dead_code, non_snake_case, clippy::all, clippy::pedantic)]
 pub fn {name}_compared() -> crate::constants::kept::Compared<{kind}> {{
@@ -213,11 +213,17 @@ fn imported<'a>(text: &'a str, constants: &'a [Constant]) -> BTreeMap<&'a str, &
     let mut names = BTreeMap::new();
     for statement in text.split(';') {
         let import = statement.rfind("use ").map(|at| &statement[at..]);
-        let Some((_, list)) = import.and_then(|import| import.split_once("constants::")) else {
+        let Some((of, list)) = import.and_then(|import| import.split_once("constants::")) else {
             continue;
         };
+        // Both tables may have a constant of the same name. `super` is the audit.
+        let of_audit = of.ends_with("audit::") || of.contains("super::");
+        let [(_, table), (_, of_audit_table)] = TABLES;
+        let table = if of_audit { of_audit_table } else { table };
         for name in list.split(|c: char| !is_of_name(c)) {
-            let constant = constants.iter().find(|c| c.name == name);
+            let constant = constants
+                .iter()
+                .find(|c| c.name == name && c.table == table);
             names.extend(constant.map(|constant| (name, constant)));
         }
     }
@@ -257,23 +263,12 @@ fn called(line: &str, next: &str, constants: &BTreeMap<&str, &Constant>) -> Stri
 
 /// Whether what stands between these is one side of a comparison, all of it. Where it cannot be told it is not.
 fn is_compared(before: &str, after: &str) -> bool {
-    let orders = ["<", ">", "<=", ">="];
     let ends = |text: &str, with: &[&str]| with.iter().any(|end| text.ends_with(end));
     let starts = |text: &str, with: &[&str]| with.iter().any(|start| text.starts_with(start));
-    let on_the_right = ends(
-        before,
-        &orders
-            .map(|order| format!(" {order}"))
-            .each_ref()
-            .map(String::as_str),
-    ) && starts(after, &[")", ",", ";", "&&", "||", "{", "}", "=>"]);
-    let on_the_left = starts(
-        after,
-        &orders
-            .map(|order| format!("{order} "))
-            .each_ref()
-            .map(String::as_str),
-    ) && ends(before, &["(", "{", "&&", "||", " =", ",", ";", "|"]);
+    let on_the_right = ends(before, &[" <", " >", " <=", " >="])
+        && starts(after, &[")", ",", ";", "&&", "||", "{", "}", "=>"]);
+    let on_the_left = starts(after, &["< ", "> ", "<= ", ">= "])
+        && ends(before, &["(", "{", "&&", "||", " =", ",", ";", "|"]);
     on_the_right || on_the_left
 }
 

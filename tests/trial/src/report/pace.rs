@@ -29,8 +29,6 @@ pub struct Pace {
     pub complaint: Option<String>,
 }
 
-/// What the keys of its figures begin with.
-pub const KEY: &str = "pace.";
 const SIX: &str = "six runs of 5,000 samples";
 const TEN_MILLION: &str = "ten runs of 1,000,000 samples";
 const GIB: f64 = 1024.0 * 1024.0 * 1024.0;

@@ -30,7 +30,7 @@ pub struct Telling<'a> {
     pub void: &'a [Case],
     pub report: &'a Report,
     pub rival: Option<&'a Rival>,
-    pub pace: &'a Table,
+    pub paces: &'a [Pace],
     /// What people found out about single cases: campaign's number and the cause.
     pub notes: &'a [(String, String)],
 }
@@ -87,7 +87,7 @@ fn front(telling: &Telling<'_>) -> String {
         &mut text,
         vec![
             bars::table("Figures and bars", telling.figures),
-            telling.pace.clone(),
+            pace::table(telling.paces),
             void_table(telling),
             shortfalls(cases),
             tally::nulls(cases),
@@ -117,11 +117,12 @@ fn front(telling: &Telling<'_>) -> String {
             methods(telling),
         ],
     );
+    text.push_str("## Long tables\n\n- [Confusion matrix](trials/confusion.md)\n");
+    if telling.rival.is_some() {
+        text.push_str("- [Figures beside the earlier engine's](trials/earlier.md)\n");
+    }
     text.push_str(
-        "## Long tables\n\n\
-         - [Confusion matrix](trials/confusion.md)\n\
-         - [Every figure beside the earlier engine's](trials/earlier.md)\n\
-         - [Every campaign](trials/cases.csv)\n\
+        "- [Every campaign](trials/cases.csv)\n\
          - [Every parameter](trials/parameters.csv)\n\n\
          ## The twenty worst cases\n\n\
          Most embarrassing first. What went wrong is read off the files by the scorer; a line behind \"cause\" was found out by hand.\n\n",
@@ -169,23 +170,22 @@ fn methods(telling: &Telling<'_>) -> Table {
     table
 }
 
-/// Every figure beside that of an earlier engine.
+/// Every figure of a trial, in the order in which it is read.
+pub fn figures(cases: &[Case], paces: &[Pace], measured: &[Headline]) -> Vec<Headline> {
+    let mut found = bars::figures(cases);
+    found.extend(certainty(cases));
+    found.extend(measured.iter().cloned());
+    found.extend(pace::headlines(paces));
+    found
+}
+
+/// Figures beside those of an earlier engine.
 fn beside_earlier(telling: &Telling<'_>, rival: &Rival) -> String {
-    let of = |cases: &[Case]| [bars::figures(cases), certainty(cases)].concat();
-    let mut own = of(&rival.same(telling.valid));
-    // A speed is no matter of the files.
-    own.extend(
-        telling
-            .figures
-            .iter()
-            .filter(|figure| figure.key.starts_with(pace::KEY))
-            .cloned(),
-    );
-    let mut earlier = of(&rival.cases);
-    earlier.extend(pace::headlines(&rival.paces));
+    let own = figures(&rival.same(telling.valid), telling.paces, &[]);
+    let earlier = figures(&rival.cases, &rival.paces, &[]);
     format!(
-        "# Every figure beside the earlier engine's\n\nPart of the [sealed trial](../trials.md): both engines on every {}th of its campaigns, judged \
-         alike. Few campaigns: the intervals are wide, and the figures of the whole trial are this engine's alone.\n\n{}",
+        "# Figures beside the earlier engine's\n\nPart of the [sealed trial](../trials.md): both engines on every {}th of its campaigns, judged \
+         alike. Few campaigns: the intervals are wide, and the figures of the whole trial, and of measured recordings, are this engine's alone.\n\n{}",
         rival.every,
         bars::beside(EARLIER, &own, &earlier).markdown()
     )

@@ -9,10 +9,9 @@ use sha2::{Digest, Sha256};
 use crate::generate::files::{generate, seal};
 use crate::generate::strata::Request;
 use crate::generate::{TEXT, instrument};
+use crate::judge::bars;
 use crate::judge::case::Case;
-use crate::judge::headline::Headline;
 use crate::judge::score::{Report, ScoreRequest, score};
-use crate::judge::{bars, certainty};
 use crate::real;
 use crate::report::pace::{self, Pace};
 use crate::report::pages::{self, Rival, Telling};
@@ -153,7 +152,7 @@ pub fn trial(trial: &Trial) -> Result<Report> {
             })
         })
         .transpose()?;
-    let figures = figures(&valid, &paces, &measured.headlines);
+    let figures = pages::figures(&valid, &paces, &measured.headlines);
     print!("{}", bars::table("Figures and bars", &figures).text());
     for table in &measured.tables {
         print!("{}", table.text());
@@ -171,22 +170,13 @@ pub fn trial(trial: &Trial) -> Result<Report> {
                 void: &void,
                 report: &report,
                 rival: rival.as_ref(),
-                pace: &pace::table(&paces),
+                paces: &paces,
                 notes: &pages::notes(&pages.join("trials").join("causes.txt"), &hash),
             },
         )?;
         measured.write(pages)?;
     }
     Ok(report)
-}
-
-/// Every figure of the trial, in the order in which it is read.
-fn figures(cases: &[Case], paces: &[Pace], measured: &[Headline]) -> Vec<Headline> {
-    let mut found = bars::figures(cases);
-    found.extend(certainty(cases));
-    found.extend(measured.iter().cloned());
-    found.extend(pace::headlines(paces));
-    found
 }
 
 /// Whether the seed may be used for this, and by this tool.
