@@ -140,7 +140,7 @@ enum Command {
         /// Seed of the campaigns, and the next one: below 999.
         #[arg(long, default_value_t = 97)]
         seed: u64,
-        /// Only constants whose name holds this.
+        /// Only constants whose name holds this, or whose path begins with it: `constants::` decide, `audit::` are the audit's.
         #[arg(long)]
         only: Option<String>,
         /// Most campaigns that are diagnosed again for a constant halved, or doubled: so many stand for all in which it may

@@ -35,7 +35,7 @@ pub struct Study {
     pub count: usize,
     /// Seed of the campaigns, below 999.
     pub seed: u64,
-    /// Only constants whose name holds this.
+    /// Only constants whose name holds this, or whose path begins with it.
     pub only: Option<String>,
     /// Most campaigns that are diagnosed again for a constant halved, or doubled; of more in which it may change something so
     /// many stand for all.
@@ -101,7 +101,7 @@ impl Study {
 
     fn wants(&self, constant: &Constant) -> bool {
         let only = self.only.as_ref();
-        only.is_none_or(|only| constant.path().contains(only.as_str()))
+        only.is_none_or(|only| constant.is_called(only))
     }
 
     /// What prints the same again.

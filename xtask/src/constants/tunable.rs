@@ -39,6 +39,11 @@ impl Constant {
         format!("{}::{}", self.table, self.name)
     }
 
+    /// Whether its name holds this, or its path begins with it: `audit::`, `constants::LEAST`.
+    pub fn is_called(&self, this: &str) -> bool {
+        self.name.contains(this) || self.path().starts_with(this)
+    }
+
     /// Halved and doubled; of what is a share or a probability, which doubled would be more than one, its odds are; a count is no
     /// less than one.
     pub fn varied(&self) -> [f64; 2] {
@@ -283,6 +288,9 @@ mod tests {
         let found = found_in(TABLE, "constants").unwrap();
         let paths: Vec<String> = found.iter().map(Constant::path).collect();
         assert_eq!(paths, ["constants::STEPS", "constants::SHARE"]);
+        assert!(found[0].is_called("TEP") && found[0].is_called("constants::"));
+        let of_audit = &found_in(TABLE, "audit::constants").unwrap()[0];
+        assert!(of_audit.is_called("audit::") && !of_audit.is_called("constants::"));
         let set = settable(TABLE, "constants", &found);
         assert!(set.contains("pub fn STEPS() -> usize"));
         assert!(set.contains("let varied = [3000.0 as usize, 12000.0 as usize];"));
