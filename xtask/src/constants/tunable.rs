@@ -221,8 +221,8 @@ fn imported<'a>(text: &'a str, constants: &'a [Constant]) -> BTreeMap<&'a str, &
         let Some((of, list)) = import.and_then(|import| import.split_once("constants::")) else {
             continue;
         };
-        // Both tables may have a constant of the same name. `super` is the audit.
-        let of_audit = of.ends_with("audit::") || of.contains("super::");
+        // Both tables may have a constant of the same name; only the audit imports its own by another path than the crate's.
+        let of_audit = !of.ends_with("crate::");
         let [(_, table), (_, of_audit_table)] = TABLES;
         let table = if of_audit { of_audit_table } else { table };
         for name in list.split(|c: char| !is_of_name(c)) {
